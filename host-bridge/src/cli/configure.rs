@@ -24,7 +24,7 @@ use crate::place::{Place, is_far};
 /// What it does, in full.
 pub const ABOUT: &str = "\
 Shows the settings that are in force on the boards, or changes some of them and keeps all others. All that is named \
-for a board comes into force at once, or is refused by the name and range of what is wrong. After its reset button or a \
+for a board comes into force together, or is refused by the name and range of what is wrong. After its reset button or a \
 power-off a board starts with its own settings again.";
 
 /// How it is used.
@@ -34,12 +34,13 @@ Examples:
   host-bridge configure amplitude_mv=1000 mode=travelling   the display, with 1 V and a wave that moves
   host-bridge configure method=counting window_ms=120       the sensor
   host-bridge configure --actuators array.csv               what the operator's fingertip carries
-  host-bridge configure > kept; host-bridge configure $(grep -v '^#' kept)
+  host-bridge configure > kept                              kept for later, but for the actuators
+  host-bridge configure --actuators array.csv $(grep -v '^#' kept)     and given again
 
 FILE is what a scene names by `file` in its section [display]: CSV with the columns \
 actuator,x_um,y_um,gain,phase_turns,inverted and, if measured, resonance_hz,damping; all fifty actuators.
 
-Exit status: 0 done; 1 a board refused, or did not answer within --within; 2 it can't be done.";
+Exit status: 0 done; 1 a board refused, or did not answer within --within; 2 it can't be done, or not be printed.";
 
 /// Between two looks at what is due.
 const TURN: Duration = Duration::from_millis(20);
@@ -78,12 +79,21 @@ impl ConfigureBoards {
         } else {
             wanted.retain(|(role, _)| bench.roles().contains(role));
         }
-        for (role, _) in &wanted {
-            if let Some(Place::Port(port)) = bench.seat(*role).map(Seat::place)
+        let mut is_whole = true;
+        for role in [Role::Sensor, Role::Display] {
+            if let Some(Place::Port(port)) = bench.seat(role).map(Seat::place)
                 && is_far(&port)
+                && let Some(index) = wanted.iter().position(|(of, _)| *of == role)
             {
                 let (port, name) = (port.display(), role.name());
-                bail!("{port} is at another site: run `host-bridge configure --{name}` there");
+                let words =
+                    format!("{name}: {port} is at another site: run `host-bridge configure` there");
+                if wanted.len() == 1 || !wanted[index].1.is_empty() {
+                    bail!(words);
+                }
+                say(&words);
+                wanted.remove(index);
+                is_whole = false;
             }
         }
         let (events, told) = unbounded();
@@ -115,7 +125,12 @@ impl ConfigureBoards {
         }
         for board in boards.iter().filter(|board| board.answer.is_none()) {
             let state = board.link.state();
-            let advice = state.advice().unwrap_or("it does not answer");
+            let silent = if board.change.is_empty() {
+                "it does not answer"
+            } else {
+                "it does not answer in time: see what is in force, `host-bridge configure`"
+            };
+            let advice = state.advice().unwrap_or(silent);
             say(&format!("{}: {state} ({advice})", board.role.name()));
         }
         let answers = boards.iter().filter_map(|board| {
@@ -135,7 +150,8 @@ impl ConfigureBoards {
             }
         }
         let is_done = |board: &Board| board.answer.as_ref().is_some_and(|answer| answer.is_done);
-        Ok(ExitCode::from(u8::from(!boards.iter().all(is_done))))
+        let is_whole = is_whole && boards.iter().all(is_done);
+        Ok(ExitCode::from(u8::from(!is_whole)))
     }
 
     /// What is to be changed of each board.

@@ -329,6 +329,11 @@ mod tests {
         assert_eq!(told(&answer), None);
         outcome.begin();
         assert_eq!(outcome.hear(Role::Display, &answer), words);
+        // Nothing of it is overdue when its time is over.
+        outcome.until = Some(Instant::now());
         assert_eq!(outcome.overdue(), None);
+        outcome.begin();
+        outcome.until = Some(Instant::now());
+        assert!(outcome.overdue().is_some());
     }
 }

@@ -7,7 +7,7 @@
 use protocol::actuators::{self, ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators};
 use protocol::{Configuration, ConfigurationReport, Configure, Message, Question, Refusal};
 
-use super::settings::{Misread, Setting, check};
+use super::settings::{Misread, Setting};
 use crate::clock::is_due;
 
 /// A question, or a change, that was not answered is repeated after so long, in µs.
@@ -75,33 +75,62 @@ struct Changing {
     since_us: u64,
     /// What was sent, once the configuration in force is known.
     sent: Option<Sent>,
-    /// The last refusal that was heard, whoever was refused.
-    refused: Option<Refusal>,
 }
 
 /// A change as it was sent.
 #[derive(Clone, Copy, Debug)]
 struct Sent {
     configuration: Configuration,
+    /// The hash of what it replaces.
+    replaces: u32,
     at_us: u64,
     /// Whether no answer came, and what is in force was asked for once more.
     is_overdue: bool,
 }
 
 impl Changing {
-    /// Whether a refusal is of this change. All programs at a port hear the answers to each of them.
+    /// Whether a refusal is of this change as it was `sent`. All programs at a port hear the answers to each of them.
     fn is_own(&self, refusal: &Refusal, sent: &Configuration) -> bool {
         use protocol::Setting as On;
+        let is_beyond = |value: i64| !(refusal.low..=refusal.high).contains(&value);
+        let setting = |name: &str| self.change.settings.iter().find(|(of, _)| of.name == name);
+        let actuators = self.change.actuators.as_ref();
+        let is_actuators = |value: fn(&Actuator) -> i64| {
+            let actuator = actuators.and_then(|all| all.get(usize::from(refusal.index)));
+            actuator.is_some_and(|actuator| is_beyond(value(actuator)))
+        };
         match refusal.setting {
-            On::Role | On::Rendering => true,
-            On::ActuatorsFirst
-            | On::ActuatorX
-            | On::ActuatorY
-            | On::ActuatorGain
-            | On::ActuatorResonance
-            | On::ActuatorDamping => self.change.actuators.is_some(),
-            setting => check(sent).is_err_and(|own| own.setting == setting),
+            // It is made of the board's own word, and of whole blocks.
+            On::Role | On::ActuatorsFirst => false,
+            On::Rendering => {
+                actuators.is_some()
+                    || ["rendering", "mode"]
+                        .into_iter()
+                        .any(|name| setting(name).is_some())
+            }
+            On::ActuatorX => is_actuators(|actuator| actuator.x_um.into()),
+            On::ActuatorY => is_actuators(|actuator| actuator.y_um.into()),
+            On::ActuatorGain => is_actuators(|actuator| actuator.gain_q15.into()),
+            On::ActuatorResonance => is_actuators(|actuator| actuator.resonance_dhz.into()),
+            On::ActuatorDamping => is_actuators(|actuator| actuator.damping_percent.into()),
+            on => {
+                let value = setting(on.name()).and_then(|(of, _)| of.value(sent));
+                value
+                    .and_then(|value| value.parse().ok())
+                    .is_some_and(is_beyond)
+            }
         }
+    }
+
+    /// How long a program with a description waits until it sends it again, in µs, besides [`AGAIN_US`]: each as long as
+    /// its description tells, since those that send two at once send neither.
+    fn spread_us(&self) -> u64 {
+        let hash = self
+            .change
+            .actuators
+            .as_ref()
+            .map(|all| actuators::hash(all));
+        u64::from(hash.unwrap_or_default() % 500) * 1_000
     }
 }
 
@@ -147,7 +176,6 @@ impl Orders {
             change,
             since_us: now_us,
             sent: None,
-            refused: None,
         });
         // What is known may be old.
         self.wanted = Some(None);
@@ -161,9 +189,13 @@ impl Orders {
 
     /// The board has answered, at `now_us`. What has come of a change, if it was the answer to one.
     pub fn on_report(&mut self, now_us: u64, report: &ConfigurationReport) -> Option<Outcome> {
-        self.wanted = None;
+        let sent = self.change.as_ref().and_then(|changing| changing.sent);
+        // A refusal may be another program's: what is asked about a change is asked all the same.
+        if !(report.refused.is_some() && sent.is_some_and(|sent| sent.is_overdue)) {
+            self.wanted = None;
+        }
         let changing = self.change.as_mut()?;
-        let Some(sent) = changing.sent else {
+        let Some(sent) = sent else {
             return self.make_change(now_us, report);
         };
         match report.refused {
@@ -176,25 +208,29 @@ impl Orders {
             None if sent.is_overdue => self.make_change(now_us, report),
             // The answer to somebody else.
             None => None,
-            // Another program's change came in between.
-            Some(refusal) if refusal.setting == protocol::Setting::Replaces => {
-                self.make_change(now_us, report)
-            }
-            // Not all of the description was heard, or another program's came in between.
-            Some(refusal)
-                if refusal.setting == protocol::Setting::Actuators
-                    && changing.change.actuators.is_some() =>
-            {
-                self.make_change(now_us, report)
-            }
-            Some(refusal) if changing.is_own(&refusal, &sent.configuration) => {
-                self.change = None;
-                Some(Outcome::Refused(refusal))
-            }
-            Some(refusal) => {
-                changing.refused = Some(refusal);
-                None
-            }
+            Some(refusal) => match refusal.setting {
+                // That of another program, if what this one replaces is in force; else another's came in between.
+                protocol::Setting::Replaces if report.hash == sent.replaces => None,
+                protocol::Setting::Replaces => self.make_change(now_us, report),
+                // Not all of the description was heard, or another program's came in between.
+                protocol::Setting::Actuators => {
+                    let own = changing.change.actuators.as_ref();
+                    let own = own.map(|all| i64::from(actuators::hash(all)));
+                    if own.is_some_and(|own| own != refusal.low)
+                        && let Some(sent) = &mut changing.sent
+                        && !sent.is_overdue
+                    {
+                        sent.is_overdue = true;
+                        self.wanted = Some(Some(now_us + changing.spread_us()));
+                    }
+                    None
+                }
+                _ if changing.is_own(&refusal, &sent.configuration) => {
+                    self.change = None;
+                    Some(Outcome::Refused(refusal))
+                }
+                _ => None,
+            },
         }
     }
 
@@ -202,9 +238,16 @@ impl Orders {
     fn make_change(&mut self, now_us: u64, report: &ConfigurationReport) -> Option<Outcome> {
         let changing = self.change.as_mut()?;
         match changing.change.of(report.configuration) {
+            // There is nothing to change, or an answer came so late that it had been given up.
+            Ok(configuration) if configuration == report.configuration => {
+                let values = changing.change.values(&configuration);
+                self.change = None;
+                Some(Outcome::Taken(values))
+            }
             Ok(configuration) => {
                 changing.sent = Some(Sent {
                     configuration,
+                    replaces: report.hash,
                     at_us: now_us,
                     is_overdue: false,
                 });
@@ -241,12 +284,7 @@ impl Orders {
         }
         let given_up =
             |changing: &mut Changing| is_due(Some(changing.since_us), GIVEN_UP_US, now_us);
-        let changing = self.change.take_if(given_up)?;
-        Some(
-            changing
-                .refused
-                .map_or(Outcome::Unanswered, Outcome::Refused),
-        )
+        self.change.take_if(given_up).map(|_| Outcome::Unanswered)
     }
 
     /// What is to be said now.

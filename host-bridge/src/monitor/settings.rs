@@ -1,6 +1,6 @@
 //! The boards' settings by name, as a person changes them: fields of the configuration on the wire.
 
-use protocol::{Configuration, Refusal, Role};
+use protocol::{Configuration, GAUGES, Refusal, Role};
 use serde_json::{Value, json};
 
 /// How a setting is given.
@@ -103,8 +103,7 @@ impl Setting {
     }
 }
 
-/// Checks every range, as a board of this protocol does. Fails with the first setting outside of its own.
-pub fn check(configuration: &Configuration) -> Result<(), Refusal> {
+fn check(configuration: &Configuration) -> Result<(), Refusal> {
     match configuration {
         Configuration::Sensor(sensor) => sensor.check(),
         Configuration::Display(display) => display.check(),
@@ -117,9 +116,11 @@ fn gauges(mask: u64) -> String {
 }
 
 fn mask(text: &str) -> Option<u8> {
-    text.chars().try_fold(0, |mask, digit| {
-        Some(mask | 1_u8.checked_shl(digit.to_digit(8)?)?)
-    })
+    let mask = text.chars().try_fold(0, |mask, digit| {
+        let gauge = digit.to_digit(10).filter(|gauge| *gauge < GAUGES as u32)?;
+        Some(mask | 1_u8.checked_shl(gauge)?)
+    })?;
+    (mask != 0).then_some(mask)
 }
 
 const fn number(name: &'static str, unit: &'static str) -> Setting {
@@ -211,22 +212,36 @@ mod tests {
 
     #[test]
     fn a_refusal_names_a_setting_as_it_is_typed() {
-        let mut refused = 0;
         for configuration in [
             Configuration::Sensor(SensorConfiguration::DEFAULT),
             Configuration::Display(DisplayConfiguration::DEFAULT),
         ] {
             for setting in of(role_of(&configuration)) {
-                for beyond in ["4294967295", "65535", "255"] {
-                    let set = setting.set(configuration, beyond);
-                    if let Some(Err(refusal)) = set.map(|set| check(&set)) {
-                        assert_eq!(refusal.setting.name(), setting.name);
-                        refused += 1;
-                    }
-                }
+                let refusals = ["4294967295", "65535", "255"]
+                    .into_iter()
+                    .filter_map(|beyond| {
+                        let set = setting.set(configuration, beyond)?;
+                        check(&set).err()
+                    });
+                let names: Vec<_> = refusals.map(|refusal| refusal.setting.name()).collect();
+                assert!(names.iter().all(|name| *name == setting.name), "{names:?}");
+                assert_eq!(
+                    names.is_empty(),
+                    setting.kind != Kind::Number,
+                    "{}",
+                    setting.name
+                );
             }
         }
-        assert!(refused >= 15, "{refused}");
+    }
+
+    #[test]
+    fn gauges_are_named_by_their_digits_and_no_others() {
+        assert_eq!(mask("01234"), Some(31));
+        assert_eq!(mask("31"), Some(0b1010));
+        for text in ["", "5", "012345", "a", "9"] {
+            assert_eq!(mask(text), None, "{text}");
+        }
     }
 
     #[test]

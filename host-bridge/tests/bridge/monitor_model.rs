@@ -233,31 +233,97 @@ fn a_change_whose_answer_was_lost_or_is_late_is_made_once() {
 }
 
 #[test]
-fn a_description_of_which_a_part_was_lost_is_sent_again() {
-    let (mut orders, sent) = overdue();
+fn a_description_of_which_a_part_was_lost_is_sent_again_but_not_at_once() {
+    let (mut orders, described) = described();
     let own = Configuration::Display(DisplayConfiguration::DEFAULT);
-    for at_us in [302_000, 303_000] {
+    assert_eq!(orders.on_report(1_000, &report(own, None)), None);
+    assert_eq!(orders.take().len(), 6);
+    for at_us in [2_000, 3_000] {
         let part = report(own, Some(Setting::Actuators));
         assert_eq!(orders.on_report(at_us, &part), None);
-        assert_eq!(orders.take().len(), 6);
+        assert_eq!(orders.take(), []);
     }
-    let outcome = orders.on_report(304_000, &report(sent, None));
+    // Each description has a time of its own, so that two programs do not meet again.
+    let asked = (0..1_000_000).step_by(1_000).find(|now_us| {
+        assert_eq!(orders.elapse(*now_us, true), None);
+        !orders.take().is_empty()
+    });
+    let spread_us = u64::from(actuators::hash(&described) % 500) * 1_000;
+    assert_eq!(asked, Some(302_000 + spread_us));
+    assert_eq!(orders.on_report(900_000, &report(own, None)), None);
+    let again = orders.take();
+    assert_eq!(again.len(), 6);
+    let Some(Message::Configure(Configure { configuration, .. })) = again.last() else {
+        panic!("{again:?}");
+    };
+    let outcome = orders.on_report(904_000, &report(*configuration, None));
     assert!(matches!(outcome, Some(Outcome::Taken(_))), "{outcome:?}");
 }
 
 #[test]
 fn what_was_refused_to_another_program_is_not_taken_for_ones_own() {
-    let (mut orders, sent) = overdue();
     let own = Configuration::Display(DisplayConfiguration::DEFAULT);
-    let another = report(own, Some(Setting::GlideMs));
-    assert_eq!(orders.on_report(302_000, &another), None);
-    let outcome = orders.on_report(303_000, &report(sent, None));
-    assert!(matches!(outcome, Some(Outcome::Taken(_))), "{outcome:?}");
-    // Where nothing else comes it may have been.
+    // The range of the report is 1 to 2: 1 000 mV are beyond it, a mode is no number.
+    for (setting, is_own) in [
+        (Setting::Role, false),
+        (Setting::GlideMs, false),
+        (Setting::ActuatorsFirst, false),
+        (Setting::AmplitudeMv, true),
+        (Setting::Rendering, true),
+        (Setting::ActuatorX, true),
+        (Setting::ActuatorResonance, true),
+    ] {
+        let (mut orders, sent) = overdue();
+        let refusal = report(own, Some(setting));
+        let outcome = orders.on_report(302_000, &refusal);
+        let expected = refusal.refused.filter(|_| is_own).map(Outcome::Refused);
+        assert_eq!(outcome, expected, "{setting:?}");
+        let outcome = orders.on_report(303_000, &report(sent, None));
+        assert_eq!(outcome.is_some(), !is_own, "{setting:?}");
+    }
+    // Where nothing else comes it is not known.
     let (mut orders, _) = overdue();
-    assert_eq!(orders.on_report(302_000, &another), None);
-    let outcome = orders.elapse(2_000_000, true);
-    assert_eq!(outcome, another.refused.map(Outcome::Refused));
+    orders.on_report(302_000, &report(own, Some(Setting::GlideMs)));
+    assert_eq!(orders.elapse(2_000_000, true), Some(Outcome::Unanswered));
+}
+
+/// Many at one board: each hears what is said to all of them.
+#[test]
+fn a_change_is_made_again_once_for_each_that_came_in_between() {
+    let (mut orders, _) = overdue();
+    let of = |glide_ms| {
+        Configuration::Display(DisplayConfiguration {
+            glide_ms,
+            ..DisplayConfiguration::DEFAULT
+        })
+    };
+    // Refused to somebody else, who did not know what is in force.
+    let known = report(of(20), Some(Setting::Replaces));
+    assert_eq!(orders.on_report(302_000, &known), None);
+    assert_eq!(orders.take(), []);
+    for glide_ms in [30, 40] {
+        let newer = report(of(glide_ms), Some(Setting::Replaces));
+        for (at_us, frames) in [(303_000, 6), (304_000, 0), (305_000, 0)] {
+            assert_eq!(orders.on_report(at_us, &newer), None);
+            assert_eq!(orders.take().len(), frames, "{glide_ms}");
+        }
+    }
+}
+
+#[test]
+fn an_answer_that_comes_after_all_is_one() {
+    let (mut orders, sent) = overdue();
+    assert_eq!(orders.elapse(2_000_000, true), Some(Outcome::Unanswered));
+    orders.take();
+    let change = Change {
+        settings: vec![(&settings::DISPLAY[7], "1000".to_owned())],
+        actuators: None,
+    };
+    orders.change(change, 2_000_000);
+    let outcome = orders.on_report(2_100_000, &report(sent, None));
+    let taken = vec![("amplitude_mv", "1000 mV".to_owned())];
+    assert_eq!(outcome, Some(Outcome::Taken(taken)));
+    assert_eq!(orders.take(), []);
 }
 
 #[test]

@@ -3,9 +3,8 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
 use std::time::Duration;
 
 use hil_sim_boards::bench::PortName;
@@ -139,13 +138,15 @@ fn settings_and_actuators_come_into_force_on_the_firmware_and_are_read_back() {
     half.args(["configure", "--within", "3600", "waves=5", "mode=uniform"]);
     half.args(["--sensor", "/dev/null/sensor", "--display"]);
     half.arg(alone.bench.path(PortName::DisplayConsole));
-    half.stderr(Stdio::inherit());
-    let mut half = half.spawn().expect("the program can be started");
-    let mut lines = BufReader::new(half.stdout.take().expect("it is piped")).lines();
-    let line = lines.next().expect("a line").expect("text");
-    assert_eq!(line, "display: mode is uniform now");
-    half.kill().expect("it runs");
-    half.wait().expect("it has run");
+    let told = folder("configure-files").join("told");
+    half.stdout(File::create(&told).expect("a file can be made"));
+    let mut half = Running::start(&mut half);
+    until("it is told", || {
+        let text = fs::read_to_string(&told).expect("it is there");
+        (text == "display: mode is uniform now\n").then_some(())
+    });
+    assert!(!half.has_ended());
+    drop(half);
     // What was shown can be given again.
     let before: Vec<&str> = own
         .into_iter()
@@ -173,6 +174,7 @@ fn what_is_no_setting_and_no_description_is_refused_before_a_board_is_asked() {
         (&["amplitude_mv"][..], "give NAME=VALUE"),
         (&["volume=1"], "the display's are mode, rendering, "),
         (&["waves=5", "waves=6"], "waves is given twice"),
+        (&["gauges=567"], "give some of 01234"),
         (&["mode=sideways"], "give uniform or travelling"),
         (
             &["waves=many"],
@@ -200,6 +202,13 @@ fn what_is_no_setting_and_no_description_is_refused_before_a_board_is_asked() {
     assert_eq!(absent.stdout.trim(), "{}");
     let far = configure(&[Path::new("relay:bench.sensor")], &["waves=5"]);
     assert_eq!(far.status.code(), Some(2), "{}", far.stderr);
-    let why = "relay:bench.sensor is at another site: run `host-bridge configure --sensor` there";
+    let why = "sensor: relay:bench.sensor is at another site: run `host-bridge configure` there";
     assert!(far.stderr.contains(why), "{}", far.stderr);
+    // What is here is looked at all the same.
+    let words = ["--within", "1"];
+    let half = configure(&[Path::new("relay:bench.sensor"), nowhere[1]], &words);
+    assert_eq!(half.status.code(), Some(1), "{}", half.stderr);
+    assert!(half.stderr.contains(why), "{}", half.stderr);
+    let why = format!("display: {}: not there (", nowhere[1].display());
+    assert!(half.stderr.contains(&why), "{}", half.stderr);
 }
