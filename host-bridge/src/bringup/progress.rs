@@ -156,6 +156,16 @@ impl Progress {
         self.steps.sort_by_key(|record| place(&record.step));
     }
 
+    /// The step that has to pass before `step` is harmless, and has not.
+    pub fn unguarded<'s>(&self, step: &'s Step) -> Option<&'s str> {
+        let has_passed = |guard: &&str| {
+            let record = self.record(guard);
+            record.is_some_and(|record| record.outcome == Outcome::Passed)
+        };
+        let mut guards = step.guarded_by.iter().map(String::as_str);
+        guards.find(|guard| !has_passed(guard))
+    }
+
     /// The step that `step` needs and that was tried in vain.
     pub fn blocks<'s>(&self, step: &'s Step) -> Option<&'s str> {
         let mut needs = step.needs.iter().map(String::as_str);
@@ -223,11 +233,26 @@ mod tests {
         assert_eq!(progress.blocks(step("link-rate")), None);
         progress.put(step("sensor-board"), Outcome::Passed, None, Vec::new(), 1.0);
         assert_eq!(progress.blocks(step("rates")), None);
+        // A finger asks for more.
+        let finger = step("finger");
+        for (guard, next) in [
+            ("zero-volt", Some("emergency-press")),
+            ("emergency-press", Some("insulation")),
+            ("insulation", Some("leakage")),
+            ("leakage", None),
+        ] {
+            for outcome in [Outcome::Failed, Outcome::LeftOut, Outcome::Blocked] {
+                progress.put(step(guard), outcome, None, Vec::new(), 0.0);
+                assert_eq!(progress.unguarded(finger), Some(guard), "{outcome:?}");
+            }
+            progress.put(step(guard), Outcome::Passed, None, Vec::new(), 0.0);
+            assert_eq!(progress.unguarded(finger), next);
+        }
         let order: Vec<&str> = progress
             .steps
             .iter()
             .map(|record| record.step.as_str())
             .collect();
-        assert_eq!(order, ["usb", "sensor-board", "display-board"]);
+        assert_eq!(order[..3], ["usb", "sensor-board", "display-board"]);
     }
 }

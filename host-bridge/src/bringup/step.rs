@@ -24,6 +24,13 @@ pub struct Step {
     pub witness: Witness,
     /// The steps without which it can't pass.
     pub needs: Vec<String>,
+    /// The steps that have to have passed before anybody does what this one says, whoever asks for it: they keep a person
+    /// from harm.
+    #[serde(default)]
+    pub guarded_by: Vec<String>,
+    /// Whether the display is told to take [`FIRST_AMPLITUDE_MV`] first: its own after a start is 5 V.
+    #[serde(default)]
+    pub sets_amplitude: bool,
     /// What is measured. All of it has to be within its limit.
     pub measures: Vec<Measure>,
 }
@@ -87,20 +94,22 @@ impl Step {
         self.measures.iter().any(|measure| measure.seen.is_none())
     }
 
-    /// Everything that it measures, judged by what has been seen and by what `answer` makes of a question.
+    /// What it measures, judged by what has been seen and by what `answer` makes of a question. Who is asked does
+    /// something first, so no question is put where what is seen is not as it has to be.
     pub fn judge(
         &self,
         sight: &Sight,
         mut answer: impl FnMut(&Measure) -> Option<Value>,
     ) -> Vec<Figure> {
-        let judge = |measure: &Measure| {
-            let value = match measure.seen {
-                Some(quantity) => quantity.value(sight),
-                None => answer(measure),
-            };
-            measure.judge(value, sight)
-        };
-        self.measures.iter().map(judge).collect()
+        let (seen, asked): (Vec<_>, Vec<_>) =
+            self.measures.iter().partition(|of| of.seen.is_some());
+        let of_boards =
+            |measure: &&Measure| measure.judge(measure.seen?.value(sight), sight).into();
+        let mut figures: Vec<Figure> = seen.iter().filter_map(of_boards).collect();
+        if figures.iter().all(|figure| figure.passes) {
+            figures.extend(asked.iter().map(|of| of.judge(answer(of), sight)));
+        }
+        figures
     }
 }
 
@@ -225,10 +234,34 @@ mod steps_tests {
         let mut before = Vec::new();
         for step in all() {
             assert!(!before.contains(&step.name), "{} twice", step.name);
-            for need in &step.needs {
+            for need in step.needs.iter().chain(&step.guarded_by) {
                 assert!(before.contains(need), "{} before {need}", step.name);
             }
             before.push(step.name.clone());
+        }
+    }
+
+    #[test]
+    fn nobody_is_asked_to_put_a_finger_on_before_the_amplitude_is_seen_to_be_low() {
+        let step = named("finger").expect("a step");
+        assert!(step.sets_amplitude);
+        for (amplitude, questions) in [
+            (None, 0),
+            (Some(Err("out of range".to_owned())), 0),
+            (Some(Ok(5_000)), 0),
+            (Some(Ok(FIRST_AMPLITUDE_MV)), 1),
+        ] {
+            let sight = Sight {
+                amplitude,
+                ..Sight::default()
+            };
+            let mut asked = 0;
+            let figures = step.judge(&sight, |_| {
+                asked += 1;
+                Some(Value::Word("yes".to_owned()))
+            });
+            let passes = figures.iter().all(|figure| figure.passes);
+            assert_eq!((asked, passes), (questions, questions == 1));
         }
     }
 

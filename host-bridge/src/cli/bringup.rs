@@ -169,7 +169,7 @@ enum Answer {
 impl Session<'_> {
     /// Measures every step of `due` in one look; true if it was not interrupted.
     fn measure_all(&mut self, due: &[&'static Step]) -> anyhow::Result<bool> {
-        let sets_amplitude = due.iter().any(|step| step.name == "amplitude");
+        let sets_amplitude = due.iter().any(|step| step.sets_amplitude);
         let sight = self.look(sets_amplitude);
         if self.desk.is_ended() {
             return Ok(false);
@@ -197,6 +197,11 @@ impl Session<'_> {
                 self.leave(step, Outcome::LeftOut, note)?;
                 continue;
             }
+            if let Some(guard) = self.progress.unguarded(step) {
+                let note = format!("{guard} has to pass first: --from {guard}");
+                self.leave(step, Outcome::Blocked, note)?;
+                continue;
+            }
             if let Some(need) = self.progress.blocks(step).filter(|_| !self.is_named) {
                 self.leave(step, Outcome::Blocked, format!("by {need}"))?;
                 continue;
@@ -219,7 +224,7 @@ impl Session<'_> {
                         break;
                     }
                     Answer::Measure => {
-                        let sight = self.look(step.name == "amplitude");
+                        let sight = self.look(step.sets_amplitude);
                         if self.desk.is_ended() {
                             return Ok(false);
                         }

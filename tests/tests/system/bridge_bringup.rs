@@ -9,7 +9,7 @@ use hil_sim_boards::bench::Command;
 use hil_sim_boards::wiring::Mistake;
 use hil_sim_core::scene::{Follows, Motion, Specimen};
 use protocol::Role;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tests::bench::folder;
 use tests::bridge;
 use tests::virtual_boards::VirtualBoards;
@@ -20,11 +20,13 @@ const LIMIT: Duration = Duration::from_secs(300);
 /// What boards that have just been reset need to find each other and the surface, in s of their time.
 const STARTS_S: f64 = 1.5;
 /// Steps that only a person can do.
-const OF_A_PERSON: [&str; 6] = [
+const OF_A_PERSON: [&str; 8] = [
     "zero-volt",
     "emergency-press",
     "frequency",
     "places",
+    "insulation",
+    "leakage",
     "finger",
     "specimens",
 ];
@@ -149,6 +151,7 @@ fn an_afternoon_at_one_bench() {
     a_sound_bench_passes_every_step_that_needs_no_person(bench);
     what_a_person_reads_off_is_judged(bench);
     who_leaves_at_a_question_has_found_no_fault(bench);
+    no_finger_goes_on_an_array_that_was_not_measured(bench);
     a_pressed_emergency_stop_is_seen(bench);
     for (mistake, step, word) in MET_BY {
         the_step_that_meets_it_names_it(bench, mistake, step, word);
@@ -211,6 +214,44 @@ fn what_a_person_reads_off_is_judged(bench: &VirtualBoards) {
         assert_eq!(ended.status, Some(status), "{}", ended.output);
         assert!(ended.output.contains("with a meter"), "{}", ended.output);
     }
+}
+
+/// Whoever asks for it, and whatever was left out.
+fn no_finger_goes_on_an_array_that_was_not_measured(bench: &VirtualBoards) {
+    const GUARDS: [&str; 4] = ["zero-volt", "emergency-press", "insulation", "leakage"];
+    let path = fresh_state("finger");
+    let finger = |outcomes: [&str; 4]| {
+        let steps = GUARDS.iter().zip(outcomes);
+        let steps: Vec<Value> = steps
+            .map(|(step, outcome)| {
+                json!({
+                    "step": step, "outcome": outcome, "note": null, "at_unix_s": 0, "looked_s": 0.0, "figures": [],
+                })
+            })
+            .collect();
+        let kept = json!({
+            "format": 1, "program": "", "protocol": 0, "schema": "", "doctor": null, "steps": steps,
+        });
+        fs::write(&path, kept.to_string()).expect("a state");
+        command(bench, &path, &["--only", "finger"], "\nyes\n")
+    };
+    for (at, guard) in GUARDS.iter().enumerate() {
+        for outcome in ["left-out", "failed", "blocked"] {
+            let mut outcomes = ["passed"; 4];
+            outcomes[at] = outcome;
+            let ended = finger(outcomes);
+            assert_eq!(ended.status, Some(1), "{}", ended.output);
+            let blocked = format!("blocked: {guard} has to pass first");
+            assert!(ended.output.contains(&blocked), "{}", ended.output);
+            assert!(!ended.output.contains("5 V"), "{}", ended.output);
+        }
+    }
+    // Reset, it has its 5 V again.
+    reset(bench);
+    let ended = finger(["passed"; 4]);
+    assert_eq!(ended.status, Some(0), "{}", ended.output);
+    let in_force = "amplitude in force: 1000 mV";
+    assert!(ended.output.contains(in_force), "{}", ended.output);
 }
 
 fn who_leaves_at_a_question_has_found_no_fault(bench: &VirtualBoards) {
