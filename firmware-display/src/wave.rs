@@ -13,7 +13,7 @@
 //! | all coefficients go over to new ones linearly, in [`GLIDE_MS`] | no voltage jumps, and a mixture of two waves that keep a bound keeps it |
 //! | a band whose longest wave is longer than 2.5 λ is not played, and fades from 2 λ on | it would make more charge than [`crate::balance`] lets alone |
 
-use protocol::texture::{BANDS, LARGEST_RATIO, LOWEST_BAND_PER_MM, PARTIALS, UNITY};
+use protocol::texture::{BANDS, LOWEST_BAND_PER_MM, PARTIALS, measured};
 use protocol::{Rendering, Texture, UpdateRate};
 
 use crate::grain;
@@ -78,13 +78,15 @@ pub enum Scale {
     Calm,
 }
 
-/// What is played in this tick, roll-offs included.
+/// What is played in a tick, roll-offs included, over the amplitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Played {
-    fundamental: f32,
-    /// rₙ cos φₙ and rₙ sin φₙ.
-    partials: [(f32, f32); PARTIALS],
-    bands: [f32; BANDS],
+pub struct Played {
+    /// s
+    pub fundamental: f32,
+    /// s rₙ ρₙ cos φₙ and s rₙ ρₙ sin φₙ.
+    pub partials: [(f32, f32); PARTIALS],
+    /// s ℓ_b ρ_b, over [`grain::RMS`].
+    pub bands: [f32; BANDS],
     /// The wave's frequency in Hz, and the hand's speed in mm/s over 2π, negative backwards.
     hz: f32,
     speed: f32,
@@ -172,14 +174,14 @@ impl Wave {
         levels: [f32; BANDS],
         wavelength: Wavelength,
     ) -> [f32; COEFFICIENTS] {
-        let partials = texture.partials.map(|partial| {
-            let ratio = f32::from(partial.ratio.min(LARGEST_RATIO)) / f32::from(UNITY);
-            let phase = u32::from(partial.phase) << 16;
-            (ratio * cosine_of(phase), ratio * sine_of(phase))
+        let ratio = |partial: usize| measured(texture.partials[partial].ratio).unwrap_or(0.0);
+        let partials = core::array::from_fn(|partial| {
+            let phase = u32::from(texture.partials[partial].phase) << 16;
+            (
+                ratio(partial) * cosine_of(phase),
+                ratio(partial) * sine_of(phase),
+            )
         });
-        let ratio = |partial: usize| {
-            f32::from(texture.partials[partial].ratio.min(LARGEST_RATIO)) / f32::from(UNITY)
-        };
         let grain_peak: f32 = levels.iter().map(|level| level * grain::PEAK).sum();
         let calm = CALM_PEAK / (peak(&partials) + grain_peak);
         let scale = match self.scale {
@@ -239,6 +241,11 @@ impl Wave {
         }
     }
 
+    /// What it is made of in this tick.
+    pub const fn played(&self) -> &Played {
+        &self.played
+    }
+
     /// The wave where it is at `turns` / 2³², with the surface at `place_um`, within ± 1.
     #[inline]
     pub fn at(&self, turns: u32, place_um: i32) -> f32 {
@@ -283,7 +290,7 @@ impl Wave {
 fn levels(texture: &Texture, wavelength: Wavelength) -> [f32; BANDS] {
     let mut levels = texture
         .bands
-        .map(|band| f32::from(band.min(LARGEST_RATIO)) * (1.0 / f32::from(UNITY) / grain::RMS));
+        .map(|band| measured(band).unwrap_or(0.0) * (1.0 / grain::RMS));
     let mut longest_mm = 1.0 / LOWEST_BAND_PER_MM;
     for level in &mut levels {
         *level *= (5.0 - 2.0 * longest_mm / wavelength.mm()).clamp(0.0, 1.0);
@@ -349,6 +356,7 @@ mod tests {
     use core::f64::consts::TAU;
 
     use protocol::Partial;
+    use protocol::texture::NOT_MEASURED;
 
     use super::*;
 
@@ -404,6 +412,18 @@ mod tests {
 
     fn value(wave: &Wave, turns: u32, place_um: i32) -> f32 {
         wave.at(turns, place_um)
+    }
+
+    #[test]
+    fn what_was_not_measured_is_not_played() {
+        let told = texture(
+            [NOT_MEASURED, 300],
+            [7, 11_111],
+            [0, NOT_MEASURED, 300, NOT_MEASURED],
+        );
+        let known = texture([0, 300], [0, 11_111], [0, 0, 300, 0]);
+        let [told, known] = [told, known].map(|of| worn(&of, Scale::Whole, 4.0, 1));
+        assert_eq!(told.target, known.target);
     }
 
     #[test]

@@ -15,7 +15,8 @@
 //! What is left of one gauge after the fit has a spectrum over wavenumber; the noise of the gauge is white in time, so
 //! of a known density in wavenumber at a known speed, and is taken off.
 //!
-//! Only what the sensor feels counts: a partial beyond [`HIGHEST_HZ`] in a block is left out of its average.
+//! Only what the sensor feels counts: a partial beyond [`HIGHEST_HZ`] in a block is left out of its average, and one that
+//! was so in all of them is told as not measured, as is a band.
 
 mod averages;
 mod block;
@@ -23,8 +24,8 @@ mod friction;
 mod partial;
 mod rest;
 
-use protocol::texture::{PARTIALS, UNITY};
-use protocol::{GAUGES, Texture};
+use protocol::texture::{NOT_MEASURED, PARTIALS, UNITY};
+use protocol::{GAUGES, Partial, Texture};
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Finding, MIN_AMPLITUDE_LSB, Touch};
@@ -285,25 +286,32 @@ impl Surface {
     pub fn say(&self, sequence: u32, instant_us: u64, slips: bool) -> Texture {
         let averages = &self.averages;
         let partials = averages.partials.map(|sum| sum.partial());
-        let powers = averages.bands.map(|[power, fundamental, _]| {
-            if fundamental > 0.0 {
-                (power / fundamental).max(0.0)
-            } else {
-                0.0
-            }
-        });
-        let repeats = partials.iter().fold(0.5, |sum, partial| {
+        let repeats = partials.iter().flatten().fold(0.5, |sum, partial| {
             let ratio = f32::from(partial.ratio) / f32::from(UNITY);
             sum + 0.5 * ratio * ratio
         });
-        let rest: f32 = powers.iter().sum();
+        let mut rest = 0.0;
+        let bands = averages.bands.map(|[power, fundamental, _]| {
+            // No block has had a line of its own in this band.
+            if fundamental <= 0.0 {
+                return NOT_MEASURED;
+            }
+            let power = (power / fundamental).max(0.0);
+            rest += power;
+            in_units(sqrt(power))
+        });
         Texture {
             sequence,
             instant_us,
             valid: self.stood_by && averages.blocks >= ENOUGH_BLOCKS,
-            partials,
+            partials: partials.map(|partial| {
+                partial.unwrap_or(Partial {
+                    ratio: NOT_MEASURED,
+                    phase: 0,
+                })
+            }),
             repeating_percent: (100.0 * repeats / (repeats + rest) + 0.5) as u8,
-            bands: powers.map(|power| in_units(sqrt(power))),
+            bands,
             friction: self.rub.friction().filter(|_| slips),
         }
     }

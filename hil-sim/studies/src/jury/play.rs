@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use firmware_display::{Display, Senses, Settings, TICK_RATE_HZ};
 use firmware_sensor::Sensor;
-use protocol::texture::UNITY;
+use protocol::texture::measured;
 use protocol::{DisplayState, SensorConfiguration, Texture};
 use realfft::num_complex::Complex64;
 
@@ -101,9 +101,13 @@ impl Record {
         if !texture.valid {
             return Some(Worth::Silent);
         }
-        let told = texture.partials.map(|partial| {
-            let ratio = f64::from(partial.ratio) / f64::from(UNITY);
-            Complex64::from_polar(ratio, TAU * f64::from(partial.phase) / 65_536.0)
+        let ratios = texture.partials.map(|partial| measured(partial.ratio));
+        if ratios[..felt].contains(&None) {
+            return Some(Worth::Silent);
+        }
+        let told = std::array::from_fn(|n| {
+            let ratio = f64::from(ratios[n].unwrap_or(0.0));
+            Complex64::from_polar(ratio, TAU * f64::from(texture.partials[n].phase) / 65_536.0)
         });
         Some(Worth::of_shape(told, truth, felt))
     }

@@ -78,13 +78,13 @@ pub struct TextureRow {
     pub instant_us: u64,
     /// [`Texture::valid`]
     pub valid: bool,
-    /// [`Partial::ratio`] of the second and the third, in thousandths of the fundamental's amplitude.
+    /// [`Partial::ratio`] of the second and the third, in thousandths of the fundamental's amplitude; 65535: not measured.
     pub partial_ratios: [u16; PARTIALS],
     /// [`Partial::phase`] of these, in turns / 2¹⁶.
     pub partial_phases: [u16; PARTIALS],
     /// [`Texture::repeating_percent`]
     pub repeating_percent: u8,
-    /// [`Texture::bands`], in thousandths of the fundamental's amplitude.
+    /// [`Texture::bands`], in thousandths of the fundamental's amplitude; 65535: not measured.
     pub bands: [u16; BANDS],
     /// [`Friction::mean_mn`]
     #[serde(default, skip_serializing_if = "Option::is_none")]
