@@ -108,6 +108,12 @@ pub fn any_is_modelled(actuators: &[Actuator; ACTUATORS]) -> bool {
     actuators.iter().any(|actuator| actuator.resonance_dhz != 0)
 }
 
+/// What these actuators' displacement is of the wave, so that no voltage gets larger than the wave: 1 where none has a model.
+pub fn scale(rendering: Rendering, actuators: &[Actuator; ACTUATORS]) -> f32 {
+    let most = |actuator| most(actuator, rendering);
+    1.0 / actuators.iter().map(most).fold(1.0, f32::max)
+}
+
 impl Skin {
     /// The lanes of these actuators, which lie as `pattern` says.
     pub fn new(rendering: Rendering, actuators: &[Actuator; ACTUATORS], pattern: &Pattern) -> Self {
@@ -128,11 +134,7 @@ impl Skin {
             let place = pattern.place_of()[index];
             skin.lane_of[index] = skin.lane_for(place, Model::of(actuator)) as u8;
         }
-        let most = actuators
-            .iter()
-            .map(|actuator| most(actuator, rendering))
-            .fold(1.0, f32::max);
-        skin.scale = 1.0 / most;
+        skin.scale = scale(rendering, actuators);
         let highest = actuators.iter().map(resonance).fold(1.0, f32::max);
         skin.sine_q30 = (CALM_PEAK * skin.scale / highest * (1_u32 << 30) as f32) as i32;
         skin

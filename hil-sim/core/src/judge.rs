@@ -2,6 +2,7 @@
 
 pub mod actuators;
 mod cycles;
+mod displacement;
 pub mod edges;
 pub mod estimates;
 pub mod event;
@@ -69,7 +70,7 @@ impl<'a> Judge<'a> {
             estimates: estimates::Judge::new(truth),
             actuators: actuators::Judge::new(truth),
             felt: felt::Judge::default(),
-            needed: needed::Judge::default(),
+            needed: needed::Judge::new(truth),
         }
     }
 

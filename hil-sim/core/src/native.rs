@@ -8,6 +8,8 @@
 //! The hash is taken in the order of their beginnings over each frame sent, with the instant of its
 //! first bit, and each set of words, with its instant.
 
+pub mod rendered;
+
 use std::time::Instant;
 
 use crate::link::channel::LinkChannel;

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use crate::judge::cycles::Cycles;
+use crate::judge::displacement::Displacement;
 use crate::judge::finite;
 use crate::judge::middle::{AboutMiddle, Point};
 use crate::judge::phase_error::Demodulator;
@@ -27,7 +28,8 @@ pub struct Actuators {
     pub frequency_hz: Option<f64>,
     /// Mean of |v|/λ̂ over the same stretch, in Hz.
     pub truth_hz: Option<f64>,
-    /// Root mean square of the phase error, cycle by cycle, against [`crate::judge::phase::DuePhase`], in cycles.
+    /// Root mean square of the phase error, cycle by cycle, against [`crate::judge::phase::DuePhase`], in cycles: of the
+    /// reference actuator's voltage, or of the displacement that it makes where that actuator's response is described.
     pub phase_error_rms_cycles: Option<f64>,
     /// Its mean, in cycles: above 0 where the stimulus is ahead.
     pub phase_error_mean_cycles: Option<f64>,
@@ -66,6 +68,8 @@ pub struct Judge {
     cycles: Cycles,
     standing: Standing,
     demodulator: Demodulator,
+    /// Of the reference actuator, if it has a response of its own.
+    displacement: Option<Displacement>,
     reactions: Reactions,
     peaks: Peaks,
     /// The words before the next edge: all are at 0 V before the first.
@@ -99,6 +103,9 @@ impl Judge {
             cycles: Cycles::default(),
             standing: Standing::new(truth.reference_actuator.min(ACTUATORS - 1)),
             demodulator: Demodulator::new(truth.display.rendering),
+            displacement: Displacement::of(
+                &truth.actuators[truth.reference_actuator.min(ACTUATORS - 1)],
+            ),
             reactions: Reactions::default(),
             peaks: Peaks::NONE,
             words: [0x8000; ACTUATORS],
@@ -138,7 +145,8 @@ impl Judge {
             actuators.frequency_hz = finite(stretch.cycles as f64 / stretch.length_s);
             actuators.truth_hz = finite(stretch.travelled_cycles / stretch.length_s);
         }
-        let error = self.demodulator.finish(peak_v);
+        let displaced = self.displacement.map(|moved| moved.largest_v());
+        let error = self.demodulator.finish(displaced.unwrap_or(peak_v));
         actuators.phase_error_rms_cycles = error.map(|error| error.rms_cycles);
         actuators.phase_error_mean_cycles = error.map(|error| error.mean_cycles);
         actuators.mean_v = self.standing.farthest_v().and_then(finite);
@@ -169,7 +177,11 @@ impl Judge {
                 Told::Point(edge, due) => {
                     let volts = volts(edge.words[self.reference]);
                     self.standing.add(&edge);
-                    self.demodulator.add(due, volts);
+                    let felt = match &mut self.displacement {
+                        Some(displacement) => displacement.at(edge.t_s, volts),
+                        None => volts,
+                    };
+                    self.demodulator.add(due, felt);
                     let point = Point {
                         edge,
                         volts,
@@ -286,6 +298,37 @@ mod tests {
             "{frequency_hz} {truth_hz}"
         );
         assert!(actuators.phase_error_rms_cycles.unwrap() < 0.005);
+    }
+
+    #[test]
+    fn an_actuator_with_a_response_of_its_own_is_judged_by_what_the_skin_gets() {
+        // 25 Hz at a resonance of 60 Hz and ζ = 0.7: for a displacement in step the voltage leads by 0.098 cycles.
+        let w: f64 = 25.0 / 60.0;
+        let lead = (2.0 * 0.7 * w).atan2(1.0 - w * w) / TAU;
+        assert!((lead - 0.0981).abs() < 1e-3, "{lead}");
+        for (ahead, described, expected) in [
+            (lead, true, 0.0),
+            (lead, false, lead),
+            (0.0, true, -lead),
+            (lead - 0.05, true, -0.05),
+        ] {
+            let run = Run {
+                ahead_cycles: Box::new(move |_| ahead),
+                amplitude_v: 0.3,
+                ..Run::steady(50.0, 2.0)
+            };
+            let mut truth = Truth::new("", "", &*run.surface_mm);
+            if described {
+                let actuator = &mut truth.actuators[truth.reference_actuator];
+                (actuator.resonance_dhz, actuator.damping_percent) = (600, 70);
+            }
+            let actuators = judge(&truth, &run.record());
+            let mean = actuators.phase_error_mean_cycles.expect("it vibrates");
+            assert!(
+                (mean - expected).abs() < 0.004,
+                "{ahead} {described}: {mean}"
+            );
+        }
     }
 
     #[test]

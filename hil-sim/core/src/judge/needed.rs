@@ -1,16 +1,18 @@
 //! Which rendering a surface needs: the lowest from which no higher one differs by what a fingertip can tell.
 //!
-//! What each rendering would play is taken as lines of power over frequency, the fundamental's being ½: the partials and
-//! bands that the sensor told of last, at the hand's mean speed, from 2 to 200 Hz. Two renderings differ if their power
-//! differs by the limen of amplitude, or the mean frequency of their power by that of frequency. By the smallest limens
-//! that are found there, so that a doubt asks for more: 2.2 dB, and a Weber fraction of 0.18.
+//! What each rendering would play of what the sensor told is taken from the display's own library
+//! ([`crate::native::rendered`]), at the hand's mean speed, as lines of power over frequency from 2 to 200 Hz. Two
+//! renderings differ if their power differs by the limen of amplitude, or the mean frequency of their power by that of
+//! frequency. By the smallest limens that are found there, so that a doubt asks for more: 2.2 dB, and a Weber fraction of
+//! 0.18. Of several surfaces, the one that needs most counts.
 
-use protocol::texture::{LOWEST_BAND_PER_MM, UNITY};
-use protocol::{Message, Role, Texture};
+use protocol::{ACTUATORS, Actuator, Message, Role, Texture};
 use serde::Serialize;
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::judge::MOTION_MM_S;
+use crate::judge::truth::Truth;
+use crate::native::rendered::{self, Line};
 use crate::run::decoder::TimedMessage;
 use crate::run::recording::TickRecord;
 
@@ -18,6 +20,8 @@ use crate::run::recording::TickRecord;
 pub const LIMEN_DB: f64 = 2.2;
 /// The smallest Weber fraction of its frequency.
 pub const WEBER: f64 = 0.18;
+/// λ that differs by more than this share is another surface's.
+const ANOTHER: f64 = 0.1;
 /// What is felt as vibration, in Hz.
 const FELT_HZ: std::ops::RangeInclusive<f64> = 2.0..=200.0;
 
@@ -43,11 +47,23 @@ impl Rendering {
     }
 }
 
+impl From<Rendering> for protocol::Rendering {
+    fn from(rendering: Rendering) -> Self {
+        match rendering {
+            Rendering::Fundamental => Self::Fundamental,
+            Rendering::Shape => Self::Shape,
+            Rendering::Texture => Self::Texture,
+        }
+    }
+}
+
 /// Listens to the sensor and watches the hand.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Judge {
+    actuators: [Actuator; ACTUATORS],
     wavelength_mm: Option<f64>,
-    texture: Option<Texture>,
+    /// Of each surface its λ and what was told of it last.
+    surfaces: Vec<(f64, Texture)>,
     /// The hand at the last tick, in ns and mm.
     hand: Option<(u64, f64)>,
     moving_s: f64,
@@ -55,6 +71,18 @@ pub struct Judge {
 }
 
 impl Judge {
+    /// Before the run.
+    pub fn new(truth: &Truth) -> Self {
+        Self {
+            actuators: truth.actuators,
+            wavelength_mm: None,
+            surfaces: Vec::new(),
+            hand: None,
+            moving_s: 0.0,
+            travel_mm: 0.0,
+        }
+    }
+
     /// What a board said.
     pub fn said(&mut self, role: Role, said: &TimedMessage) {
         match &said.message {
@@ -62,9 +90,20 @@ impl Judge {
                 self.wavelength_mm = estimate.wavelength_mm.map(f64::from);
             }
             Message::Texture(texture) if role == Role::Sensor && texture.valid => {
-                self.texture = Some(*texture);
+                if let Some(wavelength_mm) = self.wavelength_mm {
+                    self.told(wavelength_mm, *texture);
+                }
             }
             _ => {}
+        }
+    }
+
+    fn told(&mut self, wavelength_mm: f64, texture: Texture) {
+        let is_the_same =
+            |known: &&mut (f64, Texture)| (wavelength_mm / known.0 - 1.0).abs() <= ANOTHER;
+        match self.surfaces.iter_mut().find(is_the_same) {
+            Some(known) => *known = (wavelength_mm, texture),
+            None => self.surfaces.push((wavelength_mm, texture)),
         }
     }
 
@@ -84,69 +123,65 @@ impl Judge {
     /// The rendering that the surface needs; none if the sensor told of no texture, or the hand did not move.
     pub fn finish(&self) -> Option<Rendering> {
         let speed_mm_s = self.travel_mm / self.moving_s;
-        let (texture, wavelength_mm) = (self.texture?, self.wavelength_mm?);
-        speed_mm_s
-            .is_finite()
-            .then(|| needed(&texture, wavelength_mm, speed_mm_s))
+        let surfaces = self.surfaces.iter().filter(|_| speed_mm_s.is_finite());
+        surfaces
+            .filter_map(|(wavelength_mm, texture)| {
+                needed(&self.actuators, texture, *wavelength_mm, speed_mm_s)
+            })
+            .max()
     }
 }
 
-/// The rendering that a surface needs under a hand of this speed.
-fn needed(texture: &Texture, wavelength_mm: f64, speed_mm_s: f64) -> Rendering {
-    let played = |rendering| played(texture, wavelength_mm, speed_mm_s, rendering);
-    let differ = |one: (f64, f64), other: (f64, f64)| {
-        let db = 10.0 * (other.0 / one.0).log10();
-        db.abs() >= LIMEN_DB || (other.1 / one.1 - 1.0).abs() >= WEBER
-    };
-    let is_enough = |rendering: &&Rendering| {
-        let mut more = Rendering::VARIANTS.iter().filter(|more| more > rendering);
-        !more.any(|&more| differ(played(**rendering), played(more)))
-    };
-    let enough = Rendering::VARIANTS.iter().find(is_enough);
-    enough.copied().unwrap_or(Rendering::Texture)
-}
-
-/// Power and mean frequency in Hz of what a rendering plays.
-fn played(
+/// The rendering that a surface needs under a hand of this speed; none if the display refuses its λ.
+fn needed(
+    actuators: &[Actuator; ACTUATORS],
     texture: &Texture,
     wavelength_mm: f64,
     speed_mm_s: f64,
-    rendering: Rendering,
-) -> (f64, f64) {
-    let in_units = |told: u16| f64::from(told) / f64::from(UNITY);
-    let fundamental_hz = speed_mm_s / wavelength_mm;
-    let mut lines = vec![(0.5, fundamental_hz)];
-    if rendering >= Rendering::Shape {
-        let partials = (2..).zip(&texture.partials);
-        lines.extend(partials.map(|(n, partial)| {
-            (
-                0.5 * in_units(partial.ratio).powi(2),
-                f64::from(n) * fundamental_hz,
-            )
-        }));
-    }
-    if rendering == Rendering::Texture {
-        let bands = (0..).zip(texture.bands);
-        lines.extend(bands.map(|(band, level)| {
-            // The middle of an octave.
-            let per_mm = f64::from(LOWEST_BAND_PER_MM) * 2_f64.powf(f64::from(band) + 0.5);
-            (in_units(level).powi(2), per_mm * speed_mm_s)
-        }));
-    }
+) -> Option<Rendering> {
+    let played = Rendering::VARIANTS.iter().map(|&rendering| {
+        let lines = rendered::lines(
+            actuators,
+            rendering.into(),
+            texture,
+            wavelength_mm,
+            speed_mm_s,
+        );
+        Some((rendering, felt(&lines?)))
+    });
+    let played: Vec<(Rendering, (f64, f64))> = played.collect::<Option<_>>()?;
+    let is_enough = |(rendering, of_one): &&(Rendering, (f64, f64))| {
+        let mut more = played.iter().filter(|(more, _)| more > rendering);
+        !more.any(|(_, of_more)| differ(*of_one, *of_more))
+    };
+    played
+        .iter()
+        .find(is_enough)
+        .map(|(rendering, _)| *rendering)
+}
+
+/// Whether a fingertip tells one from the other by power or by mean frequency.
+fn differ(one: (f64, f64), other: (f64, f64)) -> bool {
+    let db = 10.0 * (other.0 / one.0).log10();
+    db.abs() >= LIMEN_DB || (other.1 / one.1 - 1.0).abs() >= WEBER
+}
+
+/// Power, and mean frequency in Hz, of what is felt of what is played.
+fn felt(lines: &[Line]) -> (f64, f64) {
     let (power, moment) = lines
         .iter()
         // The fundamental is what the others are compared with, wherever it is.
         .enumerate()
-        .filter(|(at, (_, hz))| *at == 0 || FELT_HZ.contains(hz))
-        .fold((0.0, 0.0), |(power, moment), (_, (of_line, hz))| {
-            (power + of_line, moment + of_line * hz)
+        .filter(|(at, line)| *at == 0 || FELT_HZ.contains(&line.hz))
+        .fold((0.0, 0.0), |(power, moment), (_, line)| {
+            (power + line.power, moment + line.power * line.hz)
         });
     (power, moment / power)
 }
 
 #[cfg(test)]
 mod tests {
-    use protocol::Partial;
+    use protocol::{Contact, DEFAULT_ACTUATORS, Estimate, GAUGES, GaugeHealth, Partial, Range};
 
     use super::*;
 
@@ -157,6 +192,10 @@ mod tests {
             bands,
             ..Texture::default()
         }
+    }
+
+    fn needed(told: &Texture, wavelength_mm: f64, speed_mm_s: f64) -> Option<Rendering> {
+        super::needed(&DEFAULT_ACTUATORS, told, wavelength_mm, speed_mm_s)
     }
 
     #[test]
@@ -171,33 +210,61 @@ mod tests {
             ([700, 300], [0, 0, 300, 800], Rendering::Texture),
         ] {
             let told = texture(ratios, bands);
-            assert_eq!(needed(&told, 2.0, 50.0), expected, "{ratios:?} {bands:?}");
+            assert_eq!(
+                needed(&told, 2.0, 50.0),
+                Some(expected),
+                "{ratios:?} {bands:?}"
+            );
         }
+    }
+
+    /// A partial and a band need room below the limits, and take it from the fundamental.
+    #[test]
+    fn what_makes_the_stimulus_weaker_by_a_limen_is_needed() {
+        for (ratio, expected) in [(270, Rendering::Fundamental), (300, Rendering::Shape)] {
+            let told = texture([ratio, 0], [0; 4]);
+            assert_eq!(needed(&told, 2.0, 50.0), Some(expected));
+        }
+        let grain = texture([0, 0], [0, 0, 120, 120]);
+        assert_eq!(needed(&grain, 2.0, 50.0), Some(Rendering::Texture));
+    }
+
+    #[test]
+    fn what_the_display_leaves_out_is_not_needed() {
+        let long = texture([0, 0], [500, 600, 0, 0]);
+        assert_eq!(needed(&long, 1.0, 50.0), Some(Rendering::Fundamental));
+        assert_eq!(needed(&long, 4.0, 50.0), Some(Rendering::Texture));
+        assert_eq!(needed(&long, 0.01, 50.0), None);
     }
 
     #[test]
     fn the_limens_are_where_they_are_said_to_be() {
-        // The power of a partial of the share x of the fundamental's at twice its frequency: (1 + 2x)/(1 + x) is the
-        // mean frequency's rise. 0.18 is at x = 0.22.
-        for (ratio, expected) in [(460, Rendering::Fundamental), (480, Rendering::Shape)] {
-            assert_eq!(needed(&texture([ratio, 0], [0; 4]), 2.0, 50.0), expected);
+        let plain = (0.5, 25.0);
+        for (power, hz, expected) in [
+            (0.5, 25.0 * 1.17, false),
+            (0.5, 25.0 * 1.19, true),
+            (0.5, 25.0 * 0.81, true),
+            (0.5 * 10_f64.powf(0.21), 25.0, false),
+            (0.5 * 10_f64.powf(0.23), 25.0, true),
+            (0.5 * 10_f64.powf(-0.23), 25.0, true),
+        ] {
+            assert_eq!(differ(plain, (power, hz)), expected, "{power} {hz}");
         }
     }
 
     #[test]
-    fn what_is_too_fast_to_be_felt_is_not_needed() {
-        let told = texture([0, 900], [0; 4]);
-        assert_eq!(needed(&told, 1.0, 60.0), Rendering::Shape);
-        assert_eq!(needed(&told, 1.0, 80.0), Rendering::Fundamental);
+    fn what_is_too_fast_to_be_felt_does_not_count() {
+        let line = |hz| Line { power: 0.5, hz };
+        assert_eq!(felt(&[line(60.0), line(180.0)]), (1.0, 120.0));
+        assert_eq!(felt(&[line(80.0), line(240.0)]), (0.5, 80.0));
+        assert_eq!(felt(&[line(240.0)]), (0.5, 240.0));
     }
 
-    #[test]
-    fn without_a_texture_or_a_movement_nothing_is_said() {
-        let mut judge = Judge::default();
-        assert_eq!(judge.finish(), None);
-        judge.wavelength_mm = Some(2.0);
-        judge.texture = Some(texture([700, 300], [0; 4]));
-        assert_eq!(judge.finish(), None);
+    fn said(message: Message) -> TimedMessage {
+        TimedMessage { at_ns: 0, message }
+    }
+
+    fn goes(judge: &mut Judge) {
         for (at_ns, position_mm) in [(0, 0.0), (500_000, 0.025)] {
             judge.tick(&TickRecord {
                 at_ns,
@@ -205,6 +272,47 @@ mod tests {
                 position_mm,
             });
         }
+    }
+
+    #[test]
+    fn without_a_texture_or_a_movement_nothing_is_said() {
+        let mut judge = Judge::new(&Truth::new("", "", &|_| 2.0));
+        assert_eq!(judge.finish(), None);
+        judge.told(2.0, texture([700, 300], [0; 4]));
+        assert_eq!(judge.finish(), None);
+        goes(&mut judge);
         assert_eq!(judge.finish(), Some(Rendering::Shape));
+    }
+
+    #[test]
+    fn of_several_surfaces_the_one_that_needs_most_counts_by_what_was_told_of_it_last() {
+        let mut judge = Judge::new(&Truth::new("", "", &|_| 2.0));
+        goes(&mut judge);
+        let (sine, ridges) = (texture([0, 0], [0; 4]), texture([700, 300], [0; 4]));
+        for (mm, told, expected) in [
+            (2.0, ridges, Rendering::Shape),
+            (2.05, sine, Rendering::Fundamental),
+            (3.0, ridges, Rendering::Shape),
+            (2.0, sine, Rendering::Shape),
+        ] {
+            let estimate = Estimate {
+                sequence: 0,
+                instant_us: 0,
+                wavelength_mm: Some(mm),
+                valid: true,
+                confidence: 1.0,
+                amplitude_lsb: 300.0,
+                counted_mm: None,
+                range: Range::T1,
+                contact: Contact::Slip,
+                velocity_um_s: 0,
+                lag_um: None,
+                gauges_used: 0x1f,
+                health: [GaugeHealth::Good; GAUGES],
+            };
+            judge.said(Role::Sensor, &said(Message::Estimate(estimate)));
+            judge.said(Role::Sensor, &said(Message::Texture(told)));
+            assert_eq!(judge.finish(), Some(expected), "{mm}");
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use protocol::{Rendering, Role};
 
+use crate::judge::displacement::Displacement;
 use crate::judge::phase_error::{Demodulated, Demodulator, holds_a_cycle, mean_on_circle};
 use crate::judge::seconds;
 use crate::judge::stimulus::{Stimulus, Told};
@@ -55,6 +56,8 @@ pub(super) struct Step {
     full_from_s: f64,
     rendering: Rendering,
     peak_v: f64,
+    /// Of the reference actuator, if it has a response of its own: then what it makes of the voltage is judged.
+    displacement: Option<Displacement>,
 }
 
 impl Step {
@@ -77,7 +80,14 @@ impl Step {
             full_from_s: f64::NEG_INFINITY,
             rendering: truth.display.rendering,
             peak_v: f64::from(truth.display.amplitude_mv) * 1e-3,
+            displacement: Displacement::of(&truth.actuators[truth.reference_actuator]),
         }
+    }
+
+    /// The largest of what is judged, in V.
+    fn peak_felt(&self) -> f64 {
+        let displaced = self.displacement.map(|moved| moved.largest_v());
+        displaced.unwrap_or(self.peak_v)
     }
 
     fn restart(&mut self, at_ns: u64) {
@@ -112,16 +122,16 @@ impl Step {
     fn end_stretch(&mut self) {
         let since = mem::replace(&mut self.since, Demodulator::new(self.rendering));
         // The mean of less than two groups would take away all that a group could tell.
-        let is_short = || since.clone().errors(self.peak_v).len() < 2 * TEXTURE_CYCLES;
+        let is_short = || since.clone().errors(self.peak_felt()).len() < 2 * TEXTURE_CYCLES;
         if self.is_unplaced && self.rendering == Rendering::Texture && is_short() {
             return;
         }
         let standing = if self.is_unplaced {
-            since.clone().standing(self.peak_v).unwrap_or(0.0)
+            since.clone().standing(self.peak_felt()).unwrap_or(0.0)
         } else {
             0.0
         };
-        let windows = since.errors(self.peak_v).into_iter();
+        let windows = since.errors(self.peak_felt()).into_iter();
         self.errors.extend(windows.map(|mut window| {
             window.error_cycles -= standing;
             window.error_cycles -= window.error_cycles.round();
@@ -154,11 +164,11 @@ impl Step {
     /// a silence.
     fn stand(&mut self) -> f64 {
         let before = self.before.clone();
-        let cycles = || before.clone().errors(self.peak_v).len();
+        let cycles = || before.clone().errors(self.peak_felt()).len();
         let known = match self.rendering {
             Rendering::Texture if cycles() < TEXTURE_CYCLES => None,
-            Rendering::Texture => before.standing(self.peak_v),
-            Rendering::Fundamental | Rendering::Shape => before.middle(self.peak_v),
+            Rendering::Texture => before.standing(self.peak_felt()),
+            Rendering::Fundamental | Rendering::Shape => before.middle(self.peak_felt()),
         };
         self.is_unplaced |= known.is_none();
         *self.standing.insert(known.unwrap_or(0.0))
@@ -171,7 +181,10 @@ impl Step {
             let Told::Point(edge, mut due) = told else {
                 continue;
             };
-            let volts = volts(edge.words[self.reference]);
+            let mut volts = volts(edge.words[self.reference]);
+            if let Some(displacement) = &mut self.displacement {
+                volts = displacement.at(edge.t_s, volts);
+            }
             let is_silent = edge.t_s >= from_s && self.notice_silence(&edge);
             if (before_s..from_s).contains(&edge.t_s) {
                 self.before.add(due, volts);

@@ -1,0 +1,125 @@
+//! What an actuator's voltage moves the skin by, where its response is described.
+
+use std::f64::consts::TAU;
+
+use protocol::Actuator;
+
+/// The displacement of an actuator with H(s) = ω₀²/(s² + 2ζω₀s + ω₀²), over that at a standing voltage, under a voltage that
+/// goes straight from point to point: solved exactly.
+#[derive(Clone, Copy, Debug)]
+pub struct Displacement {
+    /// ω₀ in rad/s, and ζ.
+    natural: f64,
+    damping: f64,
+    /// The last point: when in s, the voltage in V, the displacement in V and its slope in V/s.
+    last: Option<(f64, f64, f64, f64)>,
+    largest_v: f64,
+}
+
+impl Displacement {
+    /// At rest, of the actuator that is described so; none if it has no response of its own.
+    pub fn of(actuator: &Actuator) -> Option<Self> {
+        (actuator.resonance_dhz != 0).then(|| Self {
+            natural: TAU * f64::from(actuator.resonance_dhz) / 10.0,
+            damping: f64::from(actuator.damping_percent) / 100.0,
+            last: None,
+            largest_v: 0.0,
+        })
+    }
+
+    /// The displacement at the next point, in V.
+    pub fn at(&mut self, t_s: f64, volts: f64) -> f64 {
+        let (from_s, from_v, moved_v, slope) = self.last.unwrap_or((t_s, volts, volts, 0.0));
+        let passed_s = t_s - from_s;
+        let next = if passed_s > 0.0 {
+            self.after(passed_s, from_v, volts, (moved_v, slope))
+        } else {
+            (moved_v, slope)
+        };
+        self.last = Some((t_s, volts, next.0, next.1));
+        self.largest_v = self.largest_v.max(next.0.abs());
+        next.0
+    }
+
+    /// The largest so far, in V.
+    pub const fn largest_v(&self) -> f64 {
+        self.largest_v
+    }
+
+    /// Displacement and slope after so many s in which the voltage goes from one value to another.
+    fn after(&self, t_s: f64, from_v: f64, to_v: f64, (moved_v, slope): (f64, f64)) -> (f64, f64) {
+        let (omega, zeta) = (self.natural, self.damping);
+        let rise = (to_v - from_v) / t_s;
+        // Under a ramp it follows the voltage by 2ζ/ω₀ later; the rest swings out.
+        let late_v = 2.0 * zeta / omega * rise;
+        let (rest_v, rest_slope) = (moved_v - (from_v - late_v), slope - rise);
+        let decay = omega * zeta;
+        let square = omega * omega * (1.0 - zeta * zeta);
+        let root = square.abs().sqrt();
+        // cos and sin/ω of the damped swing, or what becomes of them without one.
+        let (even, odd) = if root * t_s < 1e-6 {
+            (1.0, t_s)
+        } else if square > 0.0 {
+            ((root * t_s).cos(), (root * t_s).sin() / root)
+        } else {
+            ((root * t_s).cosh(), (root * t_s).sinh() / root)
+        };
+        let left = (-decay * t_s).exp();
+        let (even, odd) = (left * even, left * odd);
+        (
+            to_v - late_v + rest_v * (even + decay * odd) + rest_slope * odd,
+            rise + rest_slope * (even - decay * odd) - rest_v * omega * omega * odd,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::DEFAULT_ACTUATORS;
+
+    use super::*;
+
+    fn of(resonance_dhz: u16, damping_percent: u16) -> Displacement {
+        let actuator = Actuator {
+            resonance_dhz,
+            damping_percent,
+            ..DEFAULT_ACTUATORS[0]
+        };
+        Displacement::of(&actuator).expect("it is described")
+    }
+
+    #[test]
+    fn a_sine_comes_with_the_gain_and_lag_of_a_second_order_system() {
+        for (dhz, percent) in [(600, 20), (600, 70), (600, 100), (300, 150), (8_000, 20)] {
+            for hz in [5.0, 35.0, 60.0, 150.0] {
+                let mut moved = of(dhz, percent);
+                let w = hz * 10.0 / f64::from(dhz);
+                let (re, im) = (1.0 - w * w, 2.0 * f64::from(percent) / 100.0 * w);
+                let (gain, lag) = (1.0 / re.hypot(im), im.atan2(re));
+                for step in 0..8_000_u32 {
+                    let t_s = f64::from(step) * 5e-4;
+                    let angle = TAU * hz * t_s;
+                    let v = moved.at(t_s, angle.sin());
+                    if step > 4_000 {
+                        // Straight lines between points 0.5 ms apart are a little less than the sine.
+                        let due = gain * (angle - lag).sin();
+                        assert!(
+                            (v - due).abs() < 0.025 * gain,
+                            "{dhz} {percent} {hz}: {v} {due}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_standing_voltage_is_reached_whole_and_without_a_response_there_is_none() {
+        let mut moved = of(600, 70);
+        assert_eq!(moved.at(0.0, 0.0), 0.0);
+        moved.at(1e-3, 2.0);
+        assert!((moved.at(1.0, 2.0) - 2.0).abs() < 1e-9);
+        assert!((2.0..2.2).contains(&moved.largest_v()), "{moved:?}");
+        assert!(Displacement::of(&DEFAULT_ACTUATORS[0]).is_none());
+    }
+}
