@@ -4,7 +4,7 @@ use protocol::Role;
 
 use crate::relay::name::Name;
 use crate::relay::remote::{RemoteState, site};
-use crate::relay::report::Notice;
+use crate::relay::report::{Holding, Notice};
 use crate::relay::site::opposite;
 use crate::shared_port::claim::{Claim, Device, held};
 
@@ -18,6 +18,8 @@ pub struct Hand {
     name: Name,
     role: Role,
     far: RemoteState,
+    /// Whether this bridge holds the bench.
+    holding: Holding,
     /// That another bridge is there, in words.
     others: Option<String>,
 }
@@ -31,6 +33,7 @@ impl Hand {
             name,
             role,
             far: RemoteState::Unheard,
+            holding: Holding::Unknown,
             others: None,
         };
         hand.tell();
@@ -43,7 +46,12 @@ impl Hand {
             Notice::Remote(_, state) => {
                 self.far = state.clone();
                 self.others = None;
+                if !matches!(state, RemoteState::Known { .. }) {
+                    self.holding = Holding::Unknown;
+                }
             }
+            Notice::Hand(holding) => self.holding = *holding,
+            Notice::WatcherGone(_) | Notice::RivalGone(_) => self.others = None,
             Notice::Watcher(_) | Notice::Rival(_) => self.others = Some(notice.to_string()),
             _ => return,
         }
@@ -61,14 +69,17 @@ impl Hand {
     }
 
     fn words(&self) -> String {
-        let who = match (self.role, &self.far) {
-            (Role::Display, RemoteState::Known { .. }) => {
+        let who = match (self.role, self.holding, &self.far) {
+            (_, Holding::Watched | Holding::Unknown, RemoteState::Known { .. }) => {
+                Notice::Hand(self.holding).to_string()
+            }
+            (Role::Display, Holding::Held, RemoteState::Known { .. }) => {
                 "the hand here moves the arm at the sensor's site".to_owned()
             }
-            (_, RemoteState::Known { .. }) => {
+            (_, Holding::Held, RemoteState::Known { .. }) => {
                 "the hand at the display's site moves the arm here".to_owned()
             }
-            (role, state) => {
+            (role, _, state) => {
                 let far = opposite(role).map_or("the other site", site);
                 format!("nobody moves the arm by it: {far}: {state}")
             }
@@ -110,6 +121,12 @@ mod tests {
             session: 7,
         };
         hand.on_notice(&Notice::Remote(Role::Sensor, known));
+        assert!(
+            said()[0].ends_with(": who holds the bench is not known"),
+            "{:?}",
+            said()
+        );
+        hand.on_notice(&Notice::Hand(Holding::Held));
         let line =
             format!("relay of bench {bench}: the hand here moves the arm at the sensor's site");
         assert_eq!(said(), std::slice::from_ref(&line));
@@ -123,6 +140,12 @@ mod tests {
             "{:?}",
             said()
         );
+        hand.on_notice(&Notice::RivalGone(Role::Display));
+        assert_eq!(said(), [line]);
+        // It has given the bench away, or came second.
+        hand.on_notice(&Notice::Hand(Holding::Watched));
+        let watches = ": another bridge of this site holds the bench: this one watches";
+        assert!(said()[0].ends_with(watches), "{:?}", said());
         drop(hand);
         assert_eq!(said(), [""; 0]);
     }

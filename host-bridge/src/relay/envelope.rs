@@ -5,15 +5,31 @@
 //! ```
 //!
 //! The [`Hello`] and the version behind it never move, so that any two builds can say that they differ.
+//!
+//! A Stop and what is answered never change either, so that any build stops any other's site:
+//!
+//! ```text
+//! Hello: 35 bytes | 0 | session, counter, sent µs: u64 LE | which Stop: u64 LE | word: 6 bytes
+//! ```
+//!
+//! with the words of [`protocol::stop`], `Stop` and `Stopped` (cause 0xff where it is not known), and for one that the board has
+//! not obeyed yet 0x00 'W' 'A' 'I' 'T' and 1 if the board was told, else 0.
 
 use protocol::frame::MAX_PAYLOAD;
+use protocol::stop::{STOP_LENGTH, Stopped};
 use protocol::{Estimate, HELLO_LENGTH, Hello, Message, Ping, Pong, Role, Stop, Trip};
 use serde::{Deserialize, Serialize};
 
 use crate::relay::gate::SequenceNumber;
 
-/// The version of everything in this file.
-pub const ENVELOPE_VERSION: u8 = 4;
+/// The version of everything in this file but for what never changes.
+pub const ENVELOPE_VERSION: u8 = 5;
+/// What stands in its place in an envelope that never changes.
+const FROZEN: u8 = 0;
+/// The word of a Stop that the board has not obeyed yet; whether it was told follows.
+const WAITING: [u8; STOP_LENGTH - 1] = [0, b'W', b'A', b'I', b'T'];
+/// The cause of a [`Stopped`] that this program does not know.
+const NO_CAUSE: u8 = u8::MAX;
 
 /// Bytes in front of the content.
 const HEADER: usize = HELLO_LENGTH + 1 + 3 * size_of::<u64>();
@@ -112,11 +128,20 @@ impl Envelope {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = vec![0; MAX_ENVELOPE];
         let (head, content) = bytes.split_at_mut(HEADER);
-        // It always fits: see MAX_CONTENT.
-        let length = postcard::to_slice(&self.content, content).map_or(0, |content| content.len());
+        let (version, length) = match frozen_bytes(&self.content) {
+            Some(frozen) => {
+                content[..frozen.len()].copy_from_slice(&frozen);
+                (FROZEN, frozen.len())
+            }
+            // It always fits: see MAX_CONTENT.
+            None => {
+                let written = postcard::to_slice(&self.content, content);
+                (ENVELOPE_VERSION, written.map_or(0, |content| content.len()))
+            }
+        };
         let numbers = [self.session, self.counter, self.sent_us];
         head[..HELLO_LENGTH].copy_from_slice(&self.hello.to_bytes());
-        head[HELLO_LENGTH] = ENVELOPE_VERSION;
+        head[HELLO_LENGTH] = version;
         for (place, number) in head[HELLO_LENGTH + 1..].chunks_exact_mut(8).zip(numbers) {
             place.copy_from_slice(&number.to_le_bytes());
         }
@@ -125,14 +150,16 @@ impl Envelope {
     }
 
     /// Reads what came over the network and believes nothing of it: length, build, shape, numbers, and whether the
-    /// sender may say it at all. Fails if it is not an envelope of this build with a sound content.
+    /// sender may say it at all. Fails if it is not an envelope of this build with a sound content, nor one that never
+    /// changes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, EnvelopeError> {
         let (hello, rest) = bytes
             .split_at_checked(HELLO_LENGTH)
             .ok_or(EnvelopeError::Strange)?;
         let hello = Hello::from_bytes(hello).ok_or(EnvelopeError::Strange)?;
         let (&version, rest) = rest.split_first().ok_or(EnvelopeError::Strange)?;
-        if version != ENVELOPE_VERSION || !hello.is_compatible() {
+        let is_frozen = version == FROZEN;
+        if !is_frozen && (version != ENVELOPE_VERSION || !hello.is_compatible()) {
             return Err(EnvelopeError::Foreign { hello, version });
         }
         if bytes.len() > MAX_ENVELOPE {
@@ -141,20 +168,25 @@ impl Envelope {
         let (session, rest) = number(rest)?;
         let (counter, rest) = number(rest)?;
         let (sent_us, rest) = number(rest)?;
-        let (content, rest) =
-            postcard::take_from_bytes(rest).map_err(|_| EnvelopeError::Malformed)?;
+        let content = if is_frozen {
+            frozen(rest)
+        } else {
+            // What is frozen is said in no other way.
+            let read = postcard::take_from_bytes(rest).ok();
+            read.filter(|(content, rest)| rest.is_empty() && frozen_bytes(content).is_none())
+                .map(|(content, _)| content)
+        };
         let envelope = Self {
             hello,
             session,
             counter,
             sent_us,
-            content,
+            content: content.ok_or(EnvelopeError::Malformed)?,
         };
-        if rest.is_empty() && envelope.is_sound() {
-            Ok(envelope)
-        } else {
-            Err(EnvelopeError::Malformed)
-        }
+        envelope
+            .is_sound()
+            .then_some(envelope)
+            .ok_or(EnvelopeError::Malformed)
     }
 
     /// The role of the sender's board; a host has none.
@@ -168,6 +200,42 @@ impl Envelope {
             (Some(role), Content::Board { message, .. }) => is_carried(role, message),
             (Some(_), _) => true,
         }
+    }
+}
+
+/// The bytes of a content that never changes; none of any other.
+fn frozen_bytes(content: &Content) -> Option<Vec<u8>> {
+    let (id, word) = match *content {
+        Content::Stop { id, stop } => (id, stop.to_bytes()),
+        Content::Stopped { id, trip } => {
+            let unknown = Stopped { cause: NO_CAUSE };
+            (id, trip.map_or(unknown, Stopped::by).to_bytes())
+        }
+        Content::Stopping { id, is_told } => {
+            let [a, b, c, d, e] = WAITING;
+            (id, [a, b, c, d, e, is_told.into()])
+        }
+        _ => return None,
+    };
+    Some([&id.to_le_bytes()[..], &word].concat())
+}
+
+/// The content that these bytes are; none if they are no such.
+fn frozen(bytes: &[u8]) -> Option<Content> {
+    let (id, word) = number(bytes).ok()?;
+    if let Some(stop) = Stop::from_bytes(word) {
+        return Some(Content::Stop { id, stop });
+    }
+    if let Some(stopped) = Stopped::from_bytes(word) {
+        let trip = stopped.trip();
+        return Some(Content::Stopped { id, trip });
+    }
+    match word.strip_prefix(&WAITING)? {
+        [is_told] => Some(Content::Stopping {
+            id,
+            is_told: *is_told != 0,
+        }),
+        _ => None,
     }
 }
 
@@ -318,6 +386,64 @@ mod tests {
         assert_eq!(bytes[44..52], 4_u64.to_le_bytes());
         assert_eq!(bytes[52..60], 5_u64.to_le_bytes());
         assert_eq!(bytes[60..66], [0, 0xff, 0xff, 0xff, 0xff, 0x0f]);
+    }
+
+    /// By its bytes, which no build may change.
+    #[test]
+    fn a_stop_and_its_answers_are_the_same_in_every_build() {
+        let stop = Stop {
+            reason: StopReason::Operator,
+        };
+        let trip = Some(Trip::Operator);
+        for (content, word) in [
+            (Content::Stop { id: 7, stop }, *b"\0STOP\0"),
+            (
+                Content::Stopped { id: 7, trip },
+                Stopped::by(Trip::Operator).to_bytes(),
+            ),
+            (
+                Content::Stopping {
+                    id: 7,
+                    is_told: true,
+                },
+                *b"\0WAIT\x01",
+            ),
+            (
+                Content::Stopping {
+                    id: 7,
+                    is_told: false,
+                },
+                *b"\0WAIT\0",
+            ),
+        ] {
+            let mut envelope = of(Role::Host, content);
+            envelope.hello.protocol = 77_u16.to_le_bytes();
+            envelope.hello.schema = [9; 8];
+            let bytes = envelope.to_bytes();
+            let numbers: Vec<u8> = [3, 4, 5, 7_u64]
+                .into_iter()
+                .flat_map(u64::to_le_bytes)
+                .collect();
+            let due = [&envelope.hello.to_bytes()[..], &[0], &numbers, &word].concat();
+            assert_eq!(bytes, due);
+            assert_eq!(Envelope::from_bytes(&bytes), Ok(envelope));
+        }
+        // A reason and a cause that only a later build knows.
+        let mut later = of(Role::Host, Content::Stop { id: 7, stop }).to_bytes();
+        *later.last_mut().expect("a word") = 200;
+        let read = Envelope::from_bytes(&later).expect("it is a Stop");
+        assert!(matches!(read.content, Content::Stop { id: 7, .. }));
+    }
+
+    #[test]
+    fn a_stop_is_said_in_no_other_way() {
+        let stop = Stop {
+            reason: StopReason::Operator,
+        };
+        let mut bytes = of(Role::Display, Content::Leaving).to_bytes();
+        bytes.truncate(HEADER);
+        bytes.extend(postcard::to_allocvec(&Content::Stop { id: 7, stop }).expect("bytes"));
+        assert_eq!(Envelope::from_bytes(&bytes), Err(EnvelopeError::Malformed));
     }
 
     #[test]

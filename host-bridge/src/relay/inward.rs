@@ -12,7 +12,7 @@ use crate::relay::age::{Age, Ages};
 use crate::relay::envelope::{Content, Envelope, EnvelopeError, sequence_number};
 use crate::relay::flow::Answer;
 use crate::relay::gate::{Gate, Order};
-use crate::relay::remote::RemoteBridge;
+use crate::relay::remote::{Bystander, RemoteBridge};
 use crate::relay::report::{Histogram, Incoming, Notice, Percentiles};
 
 /// For so long after another bridge has got the bench, in µs, its board's messages wait: the board here is to notice that
@@ -69,7 +69,7 @@ pub struct Inward {
     total: Histogram,
     recent: Histogram,
     round_trip_us: u64,
-    told_rival: bool,
+    watcher: Bystander,
     told_slow: bool,
 }
 
@@ -88,7 +88,7 @@ impl Inward {
             total: Histogram::default(),
             recent: Histogram::default(),
             round_trip_us: 0,
-            told_rival: false,
+            watcher: Bystander::default(),
             told_slow: false,
         }
     }
@@ -111,6 +111,13 @@ impl Inward {
                 return Heard::Nothing;
             }
         };
+        if !envelope.hello.is_compatible() {
+            // Of another build: a Stop all the same. What it says of its board stands for no board that is held here.
+            return match envelope.content {
+                Content::Stop { id, stop } => Heard::Stop(id, stop),
+                _ => Heard::Nothing,
+            };
+        }
         self.greet(&envelope, now_us, &mut tell);
         let is_holder = self.gate.is_holder(envelope.session);
         match envelope.content {
@@ -167,6 +174,9 @@ impl Inward {
         if self.remote.elapse(now_us) {
             tell(Notice::Remote(self.role, self.remote.state().clone()));
         }
+        if self.watcher.elapse(now_us) {
+            tell(Notice::WatcherGone(self.role));
+        }
     }
 
     /// Who is at the other site.
@@ -194,11 +204,10 @@ impl Inward {
     fn greet(&mut self, envelope: &Envelope, now_us: u64, tell: &mut impl FnMut(Notice)) {
         if self.gate.ask(envelope.session, now_us) {
             self.begin(now_us);
-            self.told_rival = false;
+            self.watcher = Bystander::default();
         }
         if !self.gate.is_holder(envelope.session) {
-            if !self.told_rival {
-                self.told_rival = true;
+            if self.watcher.hear(now_us) {
                 tell(Notice::Watcher(self.role));
             }
         } else if self.remote.hear(envelope.hello, envelope.session, now_us) {
@@ -357,7 +366,8 @@ impl Outbox {
 mod tests {
     use super::*;
     use crate::clock::{Clock, SystemClock};
-    use protocol::Motion;
+    use crate::relay::site::bridge_hello;
+    use protocol::{Motion, StopReason};
 
     fn outbox() -> Outbox {
         Outbox::new(SystemClock.notify())
@@ -376,6 +386,32 @@ mod tests {
             age_us: 0,
             came_us: 0,
         }
+    }
+
+    #[test]
+    fn a_stop_of_another_build_is_obeyed_and_nothing_else_of_it_is_believed() {
+        let mut inward = Inward::new(Role::Sensor, 1, Duration::from_secs(1));
+        let stop = Stop {
+            reason: StopReason::Operator,
+        };
+        for (content, expected) in [
+            (Content::Stop { id: 7, stop }, Heard::Stop(7, stop)),
+            (Content::Stopped { id: 7, trip: None }, Heard::Nothing),
+            (Content::Leaving, Heard::Nothing),
+        ] {
+            let mut hello = bridge_hello(Role::Sensor);
+            hello.protocol = 77_u16.to_le_bytes();
+            let envelope = Envelope {
+                hello,
+                session: 9,
+                counter: 1,
+                sent_us: 0,
+                content,
+            };
+            let heard = inward.hear(&envelope.to_bytes(), 0, |_| {});
+            assert_eq!(heard, expected);
+        }
+        assert_eq!(inward.remote.state().word(), "foreign");
     }
 
     #[test]

@@ -29,6 +29,27 @@ pub enum RemoteState {
     },
 }
 
+/// Somebody besides the two bridges that talk to each other: told when he comes, and when he has gone.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Bystander {
+    heard_us: Option<u64>,
+}
+
+impl Bystander {
+    /// He was heard. True if he is new.
+    pub const fn hear(&mut self, now_us: u64) -> bool {
+        self.heard_us.replace(now_us).is_none()
+    }
+
+    /// Time passes. True if he has just gone.
+    pub fn elapse(&mut self, now_us: u64) -> bool {
+        let is_silent = |heard_us| now_us.saturating_sub(heard_us) > SILENCE_US;
+        self.heard_us
+            .take_if(|heard_us| is_silent(*heard_us))
+            .is_some()
+    }
+}
+
 impl RemoteState {
     /// One word for it, for scripts; never changes.
     pub const fn word(&self) -> &'static str {
@@ -132,6 +153,19 @@ pub const fn site(role: Role) -> &'static str {
 mod tests {
     use super::*;
     use crate::link::host_hello;
+
+    #[test]
+    fn a_bystander_is_told_of_when_he_comes_and_when_he_has_gone_each_time() {
+        let mut other = Bystander::default();
+        for start_us in [0, 100 * SILENCE_US] {
+            assert!(!other.elapse(start_us));
+            assert!(other.hear(start_us));
+            assert!(!other.hear(start_us + SILENCE_US));
+            assert!(!other.elapse(start_us + 2 * SILENCE_US));
+            assert!(other.elapse(start_us + 2 * SILENCE_US + 1));
+            assert!(!other.elapse(start_us + 3 * SILENCE_US));
+        }
+    }
 
     #[test]
     fn who_is_heard_is_known_until_it_is_silent() {

@@ -182,8 +182,12 @@ pub enum Notice {
     Remote(Role, RemoteState),
     /// A second bridge is heard from there; it watches while the first one speaks.
     Watcher(Role),
+    /// None of these is heard from there any more.
+    WatcherGone(Role),
     /// Another bridge has one's own role and name, and may hold the bench.
     Rival(Role),
+    /// No other one is heard any more.
+    RivalGone(Role),
     /// Whether this bridge holds the bench.
     Hand(Holding),
     /// At that site, who held the bench has handed it over to who waited.
@@ -238,6 +242,12 @@ impl fmt::Display for Notice {
             Self::Rival(role) => write!(
                 f,
                 "another bridge calls itself {} under this name: whichever was first holds the bench, the other one watches; to hand it over, send SIGUSR2 to who holds it, or end that one",
+                site(*role)
+            ),
+            Self::WatcherGone(role) => write!(f, "{}: the second bridge has gone", site(*role)),
+            Self::RivalGone(role) => write!(
+                f,
+                "no other bridge calls itself {} under this name any more",
                 site(*role)
             ),
             Self::Hand(Holding::Held) => f.write_str("this bridge holds the bench"),

@@ -31,6 +31,7 @@ use crate::relay::inward::{Heard, Inward};
 use crate::relay::name::{Channel, Name};
 use crate::relay::network::NetworkError;
 use crate::relay::outward::Outward;
+use crate::relay::remote::Bystander;
 use crate::relay::report::{Notice, Report};
 use crate::relay::stops::{Standing, Stops};
 use crate::relay::transport::{Connection, Subscription, Transport};
@@ -88,7 +89,7 @@ struct Shared {
     far_board: OnceLock<FarBoard>,
     stops: Mutex<Stops>,
     hand: Mutex<Hand>,
-    told_rival: AtomicBool,
+    rival: Mutex<Bystander>,
     notices: Sender<Notice>,
     is_ended: AtomicBool,
     /// Wakes the keeper for its end.
@@ -146,7 +147,7 @@ impl Site {
             far_board: OnceLock::new(),
             stops: Mutex::new(Stops::default()),
             hand: Mutex::new(Hand::default()),
-            told_rival: AtomicBool::new(false),
+            rival: Mutex::default(),
             notices,
             is_ended: AtomicBool::new(false),
             keeper_woken: clock.notify(),
@@ -444,7 +445,7 @@ impl Shared {
     fn hear_rival(&self, bytes: &[u8]) {
         if let Ok(envelope) = Envelope::from_bytes(bytes)
             && envelope.session != self.session
-            && !self.told_rival.swap(true, Ordering::Relaxed)
+            && locked(&self.rival).hear(self.now_us())
         {
             self.tell(Notice::Rival(self.settings.role));
         }

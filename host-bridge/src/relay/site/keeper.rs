@@ -81,6 +81,10 @@ impl Keeper {
             locked(&self.shared.hand).on_silence();
         }
         drop(inward);
+        if locked(&self.shared.rival).elapse(at_us) {
+            self.shared
+                .tell(Notice::RivalGone(self.shared.settings.role));
+        }
         let is_answered = locked(&self.shared.outward).flow.is_answered(at_us);
         if is_answered || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
