@@ -1,5 +1,6 @@
 //! `host-bridge record`.
 
+use std::collections::VecDeque;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -91,6 +92,50 @@ pub struct Record {
     boards: super::Where,
 }
 
+/// Most events that wait for a recorder that is about to start: some 10 s of both boards.
+const MOST_WAITING: usize = 10_000;
+
+/// Hears the boards from before there is a recorder.
+#[derive(Default)]
+struct Ear(Mutex<Heard>);
+
+enum Heard {
+    /// Nobody has begun to record: what was heard so far.
+    Waiting(VecDeque<(Role, Event)>),
+    By(Arc<Recorder>),
+}
+
+impl Default for Heard {
+    fn default() -> Self {
+        Self::Waiting(VecDeque::new())
+    }
+}
+
+impl Ear {
+    fn on_event(&self, role: Role, event: &Event) {
+        match &mut *locked(&self.0) {
+            Heard::By(recorder) => recorder.on_event(role, event),
+            Heard::Waiting(events) => {
+                if events.len() >= MOST_WAITING {
+                    events.pop_front();
+                }
+                events.push_back((role, event.clone()));
+            }
+        }
+    }
+
+    /// The recorder is there: it gets all that was heard, in its order.
+    fn begin(&self, recorder: &Arc<Recorder>) {
+        let mut heard = locked(&self.0);
+        if let Heard::Waiting(events) = &*heard {
+            for (role, event) in events {
+                recorder.on_event(*role, event);
+            }
+        }
+        *heard = Heard::By(Arc::clone(recorder));
+    }
+}
+
 impl Record {
     /// Records.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
@@ -103,16 +148,9 @@ impl Record {
         let (logs, lines) = Logs::new();
         // Before there is a file: an old one is not to go for a log that can't be read.
         follow(&bench, &roles, &logs)?;
-        let recorder = Arc::new(Recorder::start(Settings {
-            mcap: self.file.clone(),
-            csv: self.csv.clone(),
-            force: self.force,
-            part: Some(part).filter(|part| !part.is_zero()),
-        })?);
-        let started = Instant::now();
-        let started_us = now_us();
         let (events, told) = channel();
-        let recording = Arc::clone(&recorder);
+        let ear = Arc::new(Ear::default());
+        let recording = Arc::clone(&ear);
         let presence = Arc::new(Mutex::new(Presence::default()));
         let theirs = Arc::clone(&presence);
         let links = super::links(&bench, move |role, event| {
@@ -129,6 +167,16 @@ impl Record {
             // Nobody listens any more when the recording ends.
             let _ = said.send(());
         });
+        // A disk that hangs holds up the recording, and no Stop.
+        let recorder = Arc::new(Recorder::start(Settings {
+            mcap: self.file.clone(),
+            csv: self.csv.clone(),
+            force: self.force,
+            part: Some(part).filter(|part| !part.is_zero()),
+        })?);
+        let started = Instant::now();
+        let started_us = now_us();
+        ear.begin(&recorder);
         Session {
             recorder: &recorder,
             links: &links,

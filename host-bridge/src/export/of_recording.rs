@@ -90,7 +90,7 @@ pub fn texture(excerpt: &Excerpt, settings: &Settings) -> Result<Made, ExportErr
         excerpt.first_s + first.instant_us.saturating_sub(start.instant_us) as f64 * 1e-6
     });
     let description = format!(
-        "gauges over the arm's way of {:.3} mm from {} mm on, {begin_s:.3} s after the recording's start, 1 is 1.65 V at the pin",
+        "gauges over the arm's way of {:.3} mm from {} mm on, {begin_s:.3} s after the recording's start by the board's clock, 1 is 1.65 V at the pin",
         high_um.abs_diff(low_um) as f64 * 1e-3,
         low_um as f64 * 1e-3,
     );

@@ -55,9 +55,10 @@ impl Device {
     pub fn of(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
         let number = metadata.rdev();
-        metadata.file_type().is_char_device().then(|| Self {
-            folder: folder(),
-            name: format!("port-{}-{}", libc::major(number), libc::minor(number)),
+        metadata.file_type().is_char_device().then(|| {
+            let name = format!("port-{}-{}", libc::major(number), libc::minor(number));
+            let folder = folder_with(&candidates(), &name);
+            Self { folder, name }
         })
     }
 
@@ -164,21 +165,50 @@ fn own_name() -> String {
 /// The user's folder for what lives no longer than his programs: where the system has one for that, or else where
 /// temporary files go.
 fn folder() -> io::Result<PathBuf> {
-    let temporary = format!("ridgelink-{}", getuid().as_raw());
+    first_usable(&candidates())
+}
+
+/// Where that may be, the best first. A service and a session of one user need not be told of the same places.
+fn candidates() -> Vec<PathBuf> {
+    let user = getuid().as_raw();
+    let temporary = format!("ridgelink-{user}");
     let of_session = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty());
     let of_session = of_session.map(|folder| Path::new(&folder).join("ridgelink"));
+    let of_user = Path::new("/run/user")
+        .join(user.to_string())
+        .join("ridgelink");
     let others = [std::env::temp_dir(), PathBuf::from("/tmp")];
     let others = others.map(|folder| folder.join(&temporary));
-    first_usable(of_session.into_iter().chain(others))
+    of_session
+        .into_iter()
+        .chain([of_user])
+        .chain(others)
+        .collect()
+}
+
+/// The one in which the lock called `name` is held, by a program that has found another one than this would; else the first
+/// that can be used. Fails as [`first_usable`] does.
+fn folder_with(folders: &[PathBuf], name: &str) -> io::Result<PathBuf> {
+    let holds = |folder: &&PathBuf| {
+        let is_own = is_own(folder).is_ok();
+        let lock = is_own.then(|| File::open(folder.join(format!("{name}.lock"))));
+        // Shared, so that two who look at once don't take each other for its holder. Closing the file gives it up.
+        let held = |file: File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
+        lock.and_then(Result::ok).is_some_and(held)
+    };
+    match folders.iter().find(holds) {
+        Some(folder) => Ok(folder.clone()),
+        None => first_usable(folders),
+    }
 }
 
 /// The first of these folders that is there, or can be made, and is this user's alone. Fails with what is wrong with
 /// the last one.
-fn first_usable(folders: impl IntoIterator<Item = PathBuf>) -> io::Result<PathBuf> {
+fn first_usable(folders: &[PathBuf]) -> io::Result<PathBuf> {
     let mut wrong = io::Error::from(ErrorKind::NotFound);
     for folder in folders {
-        match own(&folder) {
-            Ok(()) => return Ok(folder),
+        match own(folder) {
+            Ok(()) => return Ok(folder.clone()),
             Err(error) => {
                 let words = format!("{}: {error}", folder.display());
                 wrong = io::Error::new(error.kind(), words);
@@ -191,9 +221,13 @@ fn first_usable(folders: impl IntoIterator<Item = PathBuf>) -> io::Result<PathBu
 /// Makes a folder if there is none, and fails unless it is this user's alone.
 fn own(folder: &Path) -> io::Result<()> {
     match DirBuilder::new().mode(0o700).create(folder) {
-        Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(error),
-        _ => {}
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
+        _ => is_own(folder),
     }
+}
+
+/// Fails unless the folder is there and this user's alone.
+fn is_own(folder: &Path) -> io::Result<()> {
     let metadata = fs::symlink_metadata(folder)?;
     if metadata.is_dir() && metadata.uid() == getuid().as_raw() && metadata.mode() & 0o077 == 0 {
         Ok(())
@@ -217,11 +251,41 @@ mod tests {
             "/",
         ]
         .map(PathBuf::from);
-        let folders = bad.clone().into_iter().chain([good.clone()]);
-        assert_eq!(first_usable(folders).expect("the last one"), good);
+        let folders = [&bad[..], std::slice::from_ref(&good)].concat();
+        assert_eq!(first_usable(&folders).expect("the last one"), good);
         fs::remove_dir(good).expect("it was made");
-        let words = first_usable(bad).expect_err("none can be used").to_string();
+        let words = first_usable(&bad)
+            .expect_err("none can be used")
+            .to_string();
         assert!(words.starts_with("/: must be a folder"), "{words}");
+    }
+
+    /// A service that found another folder than a session does.
+    #[test]
+    fn a_port_is_claimed_where_another_program_has_claimed_it() {
+        let [session, service] = ["session", "service"].map(|of| {
+            let name = format!("claim-{of}-{}", std::process::id());
+            std::env::temp_dir().join(name)
+        });
+        let folders = [session.clone(), service.clone()];
+        let device = |folders: &[PathBuf]| Device {
+            folder: folder_with(folders, "port-1-2"),
+            name: "port-1-2".to_owned(),
+        };
+        let claim = device(&folders[1..])
+            .claim()
+            .expect("a folder")
+            .expect("nobody else");
+        let late = device(&folders);
+        assert!(late.claim().expect("a folder").is_none(), "it has it");
+        assert!(late.socket().starts_with(&service));
+        drop(claim);
+        let first = device(&folders);
+        assert!(first.claim().expect("a folder").is_some());
+        assert!(first.socket().starts_with(&session), "nobody has it there");
+        for folder in folders {
+            fs::remove_dir_all(folder).expect("it was made");
+        }
     }
 
     #[test]

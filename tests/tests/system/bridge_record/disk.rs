@@ -178,6 +178,30 @@ fn a_disk_that_stands_still_holds_up_no_stop() {
     running.wait(LIMIT);
 }
 
+/// Nor where it stands still before there is a recording: nobody reads the pipe.
+#[test]
+fn a_disk_that_stands_still_from_the_start_holds_up_no_stop() {
+    let path = folder("hung-at-once").join("hung.mcap");
+    mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("it can be made");
+    let pair = Pair::new();
+    let words = [path.to_str().expect("UTF-8"), "--force", "--no-gauges"];
+    let running = pair.record(&mut bridge::command(), &words);
+    let hears = |role: Role, is_due: fn(&Message) -> bool| {
+        let board = pair.board(role);
+        let is_heard = wait_until(LIMIT, || board.take_heard().iter().any(is_due));
+        assert!(is_heard, "the {}", role.name());
+    };
+    for role in [Role::Sensor, Role::Display] {
+        hears(role, |message| matches!(message, Message::Hello(_)));
+    }
+    signal(&running, "-USR1");
+    for role in [Role::Sensor, Role::Display] {
+        hears(role, |message| matches!(message, Message::Stop(_)));
+    }
+    signal(&running, "-KILL");
+    running.wait(LIMIT);
+}
+
 #[test]
 fn a_disk_that_takes_nothing_at_all_gets_no_empty_file_and_keeps_the_old_one() {
     let folder = folder("nothing");
