@@ -22,7 +22,9 @@ use super::rtt::Log;
 use super::sensor::SensorPins;
 use super::wire::TimedByte;
 use super::{ElfError, Firmware, Firmwares};
-use hil_sim_core::scene::{ArmDrive, Follows, Gauges, Kinematic, Link, Motion, Scene, Specimen};
+use hil_sim_core::scene::{
+    ArmDrive, Follows, Gauges, Irregularity, Kinematic, Link, Motion, Scene, Specimen,
+};
 use strokes::Strokes;
 use tally::{Outputs, Side};
 
@@ -114,6 +116,7 @@ pub fn run(
         Left::new("sensor", sensor),
         Left::new("display", display),
         crossed,
+        soak.link.loss,
     ))
 }
 
@@ -128,6 +131,7 @@ fn scene(soak: &Soak, end_ns: u64, hand: Motion) -> Scene {
             length_mm,
         })
         .to_vec();
+    scene.surface.irregularity = Irregularity::rich(soak.rendering);
     scene.motion = hand;
     scene.arm = ArmDrive {
         follows: Follows::Link,

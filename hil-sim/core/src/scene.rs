@@ -15,7 +15,7 @@ mod windowed_sinc;
 use std::sync::Arc;
 
 use firmware_display::Settings;
-use protocol::{DisplayConfiguration, GAUGES, Method, Refusal, SensorConfiguration};
+use protocol::{DisplayConfiguration, GAUGES, Method, Refusal, Rendering, SensorConfiguration};
 
 use crate::scene::fault::Fault;
 use strum::{IntoStaticStr, VariantArray};
@@ -120,6 +120,25 @@ impl Irregularity {
         worn: 0.0,
         seed: 1,
     };
+
+    /// A surface that gives a rendering all that it can play: a second partial of λ/2, and heights at random. The grating's
+    /// own shape has a third partial.
+    pub fn rich(rendering: Rendering) -> Self {
+        Self {
+            random: if rendering == Rendering::Texture {
+                0.3
+            } else {
+                0.0
+            },
+            second_wave: if rendering == Rendering::Fundamental {
+                0.0
+            } else {
+                0.4
+            },
+            second_ratio: 0.5,
+            ..Self::NONE
+        }
+    }
 
     /// Whether there is nothing irregular.
     pub fn is_none(&self) -> bool {

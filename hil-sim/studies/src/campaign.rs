@@ -23,7 +23,7 @@ use hil_sim_core::judge::fault::{Finding, finding};
 use hil_sim_core::run::decoder::TimedMessage;
 use hil_sim_core::scene::fault::catalogue::{Class, Lasts};
 use hil_sim_core::scene::fault::{Fault, Kind, nanoseconds};
-use hil_sim_core::scene::{Display, Motion, Scene, Specimen, Surface};
+use hil_sim_core::scene::{Display, Irregularity, Motion, Scene, Specimen, Surface};
 
 /// From power on until the stimulus can be driving, in s: of both boards, and of the display alone. A sensor that starts again
 /// within its first third of a second is taken for late.
@@ -186,7 +186,7 @@ impl Plan {
                     configuration,
                     ..Display::default()
                 },
-                surface: surface(wavelengths_mm),
+                surface: surface(wavelengths_mm, configuration.rendering),
                 ..Scene::constant(wavelengths_mm[0], 50.0)
             },
             tried: Vec::new(),
@@ -194,8 +194,8 @@ impl Plan {
     }
 }
 
-/// Two wavelengths in turn, further than a run goes.
-fn surface(wavelengths_mm: [f64; 2]) -> Surface {
+/// Two wavelengths in turn, further than a run goes, with all that the rendering can play.
+fn surface(wavelengths_mm: [f64; 2], rendering: Rendering) -> Surface {
     const PIECES: usize = 100;
     let piece = |number: usize| Specimen {
         wavelength_mm: wavelengths_mm[number % 2],
@@ -205,7 +205,10 @@ fn surface(wavelengths_mm: [f64; 2]) -> Surface {
             _ => PIECE_MM,
         },
     };
-    let plain = Scene::constant(wavelengths_mm[0], 50.0).surface;
+    let plain = Surface {
+        irregularity: Irregularity::rich(rendering),
+        ..Scene::constant(wavelengths_mm[0], 50.0).surface
+    };
     if wavelengths_mm[0] == wavelengths_mm[1] {
         return plain;
     }
@@ -355,7 +358,7 @@ mod tests {
     #[test]
     fn the_first_wave_that_no_specimen_has_is_told() {
         let scene = Scene {
-            surface: surface(VARIED),
+            surface: surface(VARIED, Rendering::Fundamental),
             ..Scene::constant(2.0, 50.0)
         };
         let plain = native::run(&Scene::constant(2.0, 50.0)).unwrap().estimates[0];

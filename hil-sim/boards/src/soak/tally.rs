@@ -234,12 +234,17 @@ impl Checks {
     }
 }
 
-/// Holds both boards' last counters against what was seen.
-pub(super) fn judge(sensor: Left, display: Left, crossed: u64) -> Soaked {
+/// Holds both boards' last counters against what was seen, on a link that loses a share of `loss`.
+pub(super) fn judge(sensor: Left, display: Left, crossed: u64, loss: f64) -> Soaked {
     let mut checks = Checks::default();
     for (board, peer) in [(&sensor, &display), (&display, &sensor)] {
         of_board(&mut checks, board);
         of_link(&mut checks, board, peer);
+        let heard = board.side.heard.counters();
+        let damaged = u64::from(heard.corrupt) + u64::from(heard.overlong);
+        let (sent, lost) = (peer.side.before_quiet, u64::from(heard.lost));
+        let due = lost_within(sent, damaged, loss);
+        checks.within(board.name, "of the peer's frames lost", lost, due);
     }
     if let Some(RoleCounters::Sensor(counters)) = sensor.status().map(|status| status.role) {
         of_sensor(&mut checks, &sensor, &counters);
@@ -332,6 +337,17 @@ fn of_link(checks: &mut Checks, board: &Left, peer: &Left) {
         accounted.map(u64::from).iter().sum(),
         (sent.saturating_sub(UNSEEN_AT_THE_END), sent),
     );
+}
+
+/// How many of the frames that were sent may leave a gap: those that the link loses, by six deviations of chance and those
+/// [`UNSEEN_AT_THE_END`], and those that it damages. A damaged end takes the next frame with it, and what comes late after all
+/// is no gap.
+fn lost_within(sent: u64, damaged: u64, loss: f64) -> (u64, u64) {
+    let expected = loss * sent as f64;
+    let chance = 6.0 * (expected * (1.0 - loss)).sqrt();
+    let low = (expected - chance).max(0.0) as u64;
+    let high = (expected + chance).ceil() as u64 + 2 * damaged;
+    (low.saturating_sub(UNSEEN_AT_THE_END), high)
 }
 
 fn of_sensor(checks: &mut Checks, sensor: &Left, counters: &SensorCounters) {
@@ -498,6 +514,27 @@ mod tests {
             let check = check.unwrap();
             assert_eq!(check.holds, holds, "{follows}: {}", check.seen);
         }
+    }
+
+    #[test]
+    fn a_link_that_loses_a_third_does_not_pass_for_one_that_loses_a_twentieth() {
+        let (sent, damaged) = (100_000, 1_200);
+        let (low, high) = lost_within(sent, damaged, 0.05);
+        for (share, holds) in [
+            (0.05, true),
+            (0.062, true),
+            (0.33, false),
+            (0.1, false),
+            (0.04, false),
+        ] {
+            let lost = (share * sent as f64) as u64;
+            assert_eq!(
+                (low..=high).contains(&lost),
+                holds,
+                "{share}: {low} to {high}"
+            );
+        }
+        assert_eq!(lost_within(0, 0, 0.05), (0, 0));
     }
 
     #[test]
