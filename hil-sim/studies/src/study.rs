@@ -102,10 +102,21 @@ pub fn short(value: impl fmt::Display) -> Cell {
     Cell(value.to_string())
 }
 
-/// A number with so many decimals, or a dash: for tables.
+/// A number with so many decimals, or a dash: for tables. What rounds to 0 has no sign.
 pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
-    let text = |value| format!("{value:.decimals$}");
-    value.into().map_or("–".to_owned(), text)
+    value
+        .into()
+        .map_or("–".to_owned(), |value| rounded(value, decimals))
+}
+
+/// A number with so many decimals; what rounds to 0 has no sign.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    match text.strip_prefix('-') {
+        Some(plain) if is_zero => plain.to_owned(),
+        _ => text,
+    }
 }
 
 /// A row of a CSV or of a table: what each column is called, and what stands in it.
@@ -232,6 +243,21 @@ impl fmt::Display for Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_rounds_to_zero_has_no_sign() {
+        for (value, decimals, text) in [
+            (-0.0004, 3, "0.000"),
+            (-0.0006, 3, "-0.001"),
+            (-0.4, 0, "0"),
+            (0.0, 1, "0.0"),
+            (12.3, 1, "12.3"),
+        ] {
+            assert_eq!(rounded(value, decimals), text);
+            assert_eq!(number(value, decimals), text);
+        }
+        assert_eq!(number(None, 2), "–");
+    }
 
     #[test]
     fn numbers_keep_their_decimals_and_nothing_is_an_empty_field() {

@@ -149,6 +149,10 @@ fn instructions_stay_within_their_budget() {
     for part in ["sines", "hand and phase", "in all"] {
         assert!(printed.contains(part), "{part} is not in {printed}");
     }
+    // The richest one, by its own limit.
+    let (status, printed, complaint) = run(&["budget", "--quick", "--rendering", "texture"]);
+    assert_eq!(status, Some(0), "{printed}{complaint}");
+    assert!(printed.contains("texture"), "{printed}");
 }
 
 #[test]
@@ -157,6 +161,17 @@ fn a_short_soak_finds_every_counter_as_it_must_be() {
     let (status, printed, complaint) = run(&["soak", "--minutes", "0.2", "--sensor-elf", &sensor]);
     assert_eq!(status, Some(0), "{printed}{complaint}");
     assert!(printed.contains("all as it must be"), "{printed}");
+    let words = [
+        "soak",
+        "--minutes",
+        "0.2",
+        "--sensor-elf",
+        &sensor,
+        "--rendering",
+        "texture",
+    ];
+    let (status, printed, complaint) = run(&words);
+    assert_eq!(status, Some(0), "{printed}{complaint}");
 }
 
 #[test]

@@ -23,6 +23,7 @@ mod second_processor;
 mod silence;
 mod stop;
 mod table_1;
+mod texture;
 mod travelling;
 
 /// Nothing out of the ordinary, for two statuses of either board.

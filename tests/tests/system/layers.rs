@@ -122,22 +122,55 @@ fn imports(folder: &Path) -> BTreeMap<Module, BTreeSet<Module>> {
         })
         .filter(|(module, _)| !module.iter().any(|part| part == "tests"))
         .collect();
-    modules
+    let texts = modules.iter().map(|(module, path)| {
+        let text = code(&fs::read_to_string(path).unwrap());
+        (module.clone(), text)
+    });
+    of_texts(&texts.collect())
+}
+
+/// The same of the modules' sources.
+fn of_texts(texts: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
+    let handed_on: BTreeMap<&Module, BTreeMap<String, Module>> = texts
         .iter()
-        .map(|(module, path)| {
-            let text = code(&fs::read_to_string(path).unwrap());
-            let targets = named(&text, module)
-                .into_iter()
-                .filter_map(|mut path| {
-                    while !path.is_empty() && !modules.contains_key(&path) {
-                        path.pop();
-                    }
-                    (!path.is_empty() && !module.starts_with(&path)).then_some(path)
-                })
-                .collect();
-            (module.clone(), targets)
-        })
-        .collect()
+        .map(|(module, text)| (module, handed_on(text, module, texts)))
+        .collect();
+    let target = |mut path: Module| {
+        let mut name = None;
+        while !path.is_empty() && !texts.contains_key(&path) {
+            name = path.pop();
+        }
+        let from = name.and_then(|name| handed_on.get(&path)?.get(&name));
+        from.cloned().unwrap_or(path)
+    };
+    let targets = |(module, text): (&Module, &String)| {
+        let mut targets: BTreeSet<Module> = named(text, module).into_iter().map(target).collect();
+        targets.retain(|path| !path.is_empty() && !module.starts_with(path));
+        (module.clone(), targets)
+    };
+    texts.iter().map(targets).collect()
+}
+
+/// What a module hands on by `pub use` of its own modules, and from which.
+fn handed_on(
+    text: &str,
+    module: &[String],
+    texts: &BTreeMap<Module, String>,
+) -> BTreeMap<String, Module> {
+    let mut found = BTreeMap::new();
+    for (at, _) in text.match_indices("pub use ") {
+        let path = text[at + "pub use ".len()..].split(';').next();
+        let path = path.unwrap_or_default().trim_start_matches("self::");
+        let mut words = path
+            .split(|c: char| !(c.is_alphanumeric() || c == '_'))
+            .filter(|word| !word.is_empty());
+        let first = words.next().unwrap_or_default().to_owned();
+        let child = [module, &[first]].concat();
+        if texts.contains_key(&child) {
+            found.extend(words.map(|word| (word.to_owned(), child.clone())));
+        }
+    }
+    found
 }
 
 fn workspace() -> PathBuf {
@@ -188,6 +221,19 @@ fn circles(graph: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
         .collect()
 }
 
+/// A judge that used the firmware's own code would be wrong where that is.
+#[test]
+fn no_judge_uses_the_firmware() {
+    let folder = workspace().join("hil-sim/core/src");
+    let mut found = vec![folder.join("judge.rs")];
+    files(&folder.join("judge"), &mut found);
+    assert!(found.len() > 20);
+    for path in found {
+        let text = code(&fs::read_to_string(&path).unwrap());
+        assert!(!text.contains("firmware_"), "{}", path.display());
+    }
+}
+
 #[test]
 fn no_layer_imports_one_above_it() {
     for (folder, layers) in LAYERS {
@@ -220,6 +266,26 @@ fn an_import_upwards_and_a_circle_are_seen() {
             "{name}: {paths:?}"
         );
     }
+    // By what their parent hands on.
+    let texts = [
+        (
+            vec!["fault".to_owned()],
+            "pub mod catalogue; mod kind; pub use kind::{All, Kind};",
+        ),
+        (
+            ["fault", "kind"].map(str::to_owned).to_vec(),
+            "use super::catalogue::Row;",
+        ),
+        (
+            ["fault", "catalogue"].map(str::to_owned).to_vec(),
+            "use super::Kind;",
+        ),
+    ];
+    let texts = texts.map(|(module, text)| (module, text.to_owned()));
+    assert_eq!(
+        circles(&of_texts(&BTreeMap::from(texts))),
+        ["fault::catalogue", "fault::kind"]
+    );
     let graph = BTreeMap::from([
         (module("scene"), BTreeSet::from([module("plant")])),
         (module("plant"), BTreeSet::from([module("scene")])),

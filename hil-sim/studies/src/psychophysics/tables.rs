@@ -9,10 +9,10 @@ use crate::psychophysics::published::{
     CHI_SQUARE, CRITICAL, FREEDOM, SAMPLES_MM, TABLE_3, TABLE_4,
 };
 use crate::psychophysics::study::{Compared, Study};
-use crate::study::{Record, Table, short};
+use crate::study::{Record, Table, rounded, short};
 
 fn fixed(value: f64, decimals: usize) -> String {
-    format!("{value:.decimals$}").replace('-', "−")
+    rounded(value, decimals).replace('-', "−")
 }
 
 /// The same, or a dash.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer};
 use strum::IntoStaticStr;
 use toml::{Table, Value};
 
-use super::Kind;
+use super::kind::Kind;
 
 /// All kinds, in the order in which they are listed.
 pub fn rows() -> &'static [Row] {
@@ -19,6 +19,32 @@ pub fn rows() -> &'static [Row] {
         rows.collect::<Result<_, _>>().expect("tests read it")
     });
     &ROWS
+}
+
+/// What the catalogue says of a kind.
+impl Kind {
+    /// All of them, in the order of the catalogue.
+    pub fn all() -> impl Iterator<Item = Self> {
+        rows().iter().map(|row| row.kind)
+    }
+
+    /// What there is to know of it.
+    pub fn row(self) -> &'static Row {
+        &rows()[self as usize]
+    }
+
+    /// Its name in scenes.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// The kind of a name in scenes.
+    pub fn from_name(name: &str) -> Option<Self> {
+        rows()
+            .iter()
+            .find(|row| row.name == name)
+            .map(|row| row.kind)
+    }
 }
 
 #[derive(Deserialize)]

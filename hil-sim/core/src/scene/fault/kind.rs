@@ -1,9 +1,6 @@
 //! The kinds of faults.
 
-use super::catalogue;
-use super::catalogue::Row;
-
-/// What breaks; [`Kind::row`] says how, and what is expected then.
+/// What breaks; its [row](super::catalogue) in the catalogue says how, and what is expected then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs, reason = "the catalogue's rows say what each of them is")]
@@ -91,32 +88,11 @@ impl Kind {
         matches!(self, Self::ArmEncoderDead | Self::ArmEncoderJump)
     }
 
-    /// All of them, in the order of the catalogue.
-    pub fn all() -> impl Iterator<Item = Self> {
-        catalogue::rows().iter().map(|row| row.kind)
-    }
-
-    /// What there is to know of it.
-    pub fn row(self) -> &'static Row {
-        &catalogue::rows()[self as usize]
-    }
-
     /// Whether a host on the display's console does it.
     pub fn is_of_host(self) -> bool {
         matches!(
             self,
             Self::StopFromConsole | Self::WrongConfiguration | Self::ConsoleFlood
         )
-    }
-
-    /// Its name in scenes.
-    pub fn name(self) -> &'static str {
-        self.row().name
-    }
-
-    /// The kind of a name in scenes.
-    pub fn from_name(name: &str) -> Option<Self> {
-        let row = catalogue::rows().iter().find(|row| row.name == name)?;
-        Some(row.kind)
     }
 }

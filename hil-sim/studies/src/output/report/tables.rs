@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::output::escape::escape;
 use crate::output::report::Chapter;
+use crate::study::rounded;
 use hil_sim_core::judge::JudgedEstimate;
 use hil_sim_core::judge::fault::Finding;
 use hil_sim_core::judge::reaction::Reaction;
@@ -16,11 +17,7 @@ const LOG_LINES: usize = 200;
 /// A number with so many decimals and its unit, or a dash.
 fn number(value: Option<f64>, decimals: usize, unit: &str) -> String {
     value.map_or("–".into(), |value| {
-        let text = format!("{value:.decimals$}");
-        // What is rounded to nothing has no sign.
-        let rest = text.strip_prefix('-');
-        let nothing = rest.filter(|rest| rest.trim_matches(['0', '.']).is_empty());
-        let text = nothing.unwrap_or(&text).replace('-', "−");
+        let text = rounded(value, decimals).replace('-', "−");
         format!("{text}{unit}")
     })
 }
