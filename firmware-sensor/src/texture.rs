@@ -25,7 +25,7 @@ mod partial;
 mod rest;
 
 use protocol::texture::{NOT_MEASURED, PARTIALS, UNITY};
-use protocol::{GAUGES, Partial, Texture};
+use protocol::{GAUGES, Texture};
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Finding, MIN_AMPLITUDE_LSB, Touch};
@@ -286,34 +286,39 @@ impl Surface {
     pub fn say(&self, sequence: u32, instant_us: u64, slips: bool) -> Texture {
         let averages = &self.averages;
         let partials = averages.partials.map(|sum| sum.partial());
-        let repeats = partials.iter().flatten().fold(0.5, |sum, partial| {
+        let powers = averages.bands.map(|[power, fundamental, _]| {
+            if fundamental > 0.0 {
+                (power / fundamental).max(0.0)
+            } else {
+                0.0
+            }
+        });
+        let repeats = partials.iter().fold(0.5, |sum, partial| {
             let ratio = f32::from(partial.ratio) / f32::from(UNITY);
             sum + 0.5 * ratio * ratio
         });
-        let mut rest = 0.0;
-        let bands = averages.bands.map(|[power, fundamental, _]| {
-            // No block has had a line of its own in this band.
-            if fundamental <= 0.0 {
-                return NOT_MEASURED;
-            }
-            let power = (power / fundamental).max(0.0);
-            rest += power;
-            in_units(sqrt(power))
-        });
-        Texture {
+        let rest: f32 = powers.iter().sum();
+        let mut told = Texture {
             sequence,
             instant_us,
             valid: self.stood_by && averages.blocks >= ENOUGH_BLOCKS,
-            partials: partials.map(|partial| {
-                partial.unwrap_or(Partial {
-                    ratio: NOT_MEASURED,
-                    phase: 0,
-                })
-            }),
+            partials,
             repeating_percent: (100.0 * repeats / (repeats + rest) + 0.5) as u8,
-            bands,
+            bands: powers.map(|power| in_units(sqrt(power))),
             friction: self.rub.friction().filter(|_| slips),
+        };
+        for (partial, sum) in told.partials.iter_mut().zip(&averages.partials) {
+            if !sum.is_measured() {
+                partial.ratio = NOT_MEASURED;
+            }
         }
+        for (level, [_, fundamental, _]) in told.bands.iter_mut().zip(&averages.bands) {
+            // No block has had a line of its own in this band.
+            if *fundamental <= 0.0 {
+                *level = NOT_MEASURED;
+            }
+        }
+        told
     }
 }
 

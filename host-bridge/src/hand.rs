@@ -20,8 +20,9 @@ pub struct Hand {
     far: RemoteState,
     /// Whether this bridge holds the bench.
     holding: Holding,
-    /// That another bridge is there, in words.
-    others: Option<String>,
+    /// That another bridge is there, in words: at the other site, and at this one.
+    watcher: Option<String>,
+    rival: Option<String>,
 }
 
 impl Hand {
@@ -34,7 +35,8 @@ impl Hand {
             role,
             far: RemoteState::Unheard,
             holding: Holding::Unknown,
-            others: None,
+            watcher: None,
+            rival: None,
         };
         hand.tell();
         hand
@@ -45,14 +47,16 @@ impl Hand {
         match notice {
             Notice::Remote(_, state) => {
                 self.far = state.clone();
-                self.others = None;
+                self.watcher = None;
                 if !matches!(state, RemoteState::Known { .. }) {
                     self.holding = Holding::Unknown;
                 }
             }
             Notice::Hand(holding) => self.holding = *holding,
-            Notice::WatcherGone(_) | Notice::RivalGone(_) => self.others = None,
-            Notice::Watcher(_) | Notice::Rival(_) => self.others = Some(notice.to_string()),
+            Notice::WatcherGone(_) => self.watcher = None,
+            Notice::RivalGone(_) => self.rival = None,
+            Notice::Watcher(_) => self.watcher = Some(notice.to_string()),
+            Notice::Rival(_) => self.rival = Some(notice.to_string()),
             _ => return,
         }
         self.tell();
@@ -84,12 +88,12 @@ impl Hand {
                 format!("nobody moves the arm by it: {far}: {state}")
             }
         };
-        let others = self.others.as_deref().map(|others| format!("; {others}"));
-        format!(
-            "relay of bench {}: {who}{}",
-            self.name,
-            others.unwrap_or_default()
-        )
+        let others: String = [&self.watcher, &self.rival]
+            .into_iter()
+            .flatten()
+            .map(|other| format!("; {other}"))
+            .collect();
+        format!("relay of bench {}: {who}{others}", self.name)
     }
 }
 

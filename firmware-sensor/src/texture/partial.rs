@@ -98,18 +98,23 @@ impl PartialSum {
         }
     }
 
-    /// The partial, less what chance adds to its power; none if there was no block in which it was to be felt.
-    pub fn partial(&self) -> Option<Partial> {
+    /// Whether there was a block in which it was to be felt.
+    pub fn is_measured(&self) -> bool {
+        self.fundamental > 0.0
+    }
+
+    /// The partial, less what chance adds to its power; none of it where it was not measured.
+    pub fn partial(&self) -> Partial {
         let [re, im] = self.relative;
-        if self.fundamental <= 0.0 {
-            return None;
+        if !self.is_measured() {
+            return Partial::default();
         }
         let power = (power(self.relative) - self.chance()).max(0.0);
         let turns = libm::atan2f(im, re) * (0.5 / core::f32::consts::PI);
-        Some(Partial {
+        Partial {
             ratio: in_units(sqrt(power) / self.fundamental),
             phase: (turns * 65_536.0) as i32 as u16,
-        })
+        }
     }
 }
 
@@ -270,7 +275,7 @@ mod tests {
     #[test]
     fn of_a_partial_chance_is_taken_off() {
         let partial = |sum: PartialSum| {
-            let Partial { ratio, phase } = sum.partial().expect("it was measured");
+            let Partial { ratio, phase } = sum.partial();
             (f32::from(ratio) / f32::from(UNITY), phase)
         };
         // √(25 − 2 · 2) / 10, and the angle of 3 + 4i.
@@ -293,7 +298,7 @@ mod tests {
                 ..ONE
             }
             .partial(),
-            None
+            Partial::default()
         );
     }
 }

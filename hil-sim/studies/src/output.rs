@@ -11,6 +11,16 @@ pub mod report;
 use std::path::Path;
 use std::{fs, io};
 
+/// A number with so many decimals; what rounds to 0 has no sign.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    match text.strip_prefix('-') {
+        Some(plain) if is_zero => plain.to_owned(),
+        _ => text,
+    }
+}
+
 /// Puts a file with this content in the place of the one that may be there, which stays if the new one can't be written. Of
 /// a link, in the place that it leads to.
 pub(crate) fn replace(path: &Path, content: &str) -> io::Result<()> {

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
+use crate::output::rounded;
 use hil_sim_core::run::batch::on_all_cores;
 
 /// A finished study.
@@ -107,16 +108,6 @@ pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
     value
         .into()
         .map_or("–".to_owned(), |value| rounded(value, decimals))
-}
-
-/// A number with so many decimals; what rounds to 0 has no sign.
-pub fn rounded(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
-    match text.strip_prefix('-') {
-        Some(plain) if is_zero => plain.to_owned(),
-        _ => text,
-    }
 }
 
 /// A row of a CSV or of a table: what each column is called, and what stands in it.

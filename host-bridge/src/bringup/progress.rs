@@ -143,7 +143,7 @@ impl Progress {
         looked_s: f64,
     ) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
-        self.steps.retain(|record| record.step != step.name);
+        self.forget(step);
         self.steps.push(Record {
             step: step.name.clone(),
             outcome,
@@ -154,6 +154,19 @@ impl Progress {
         });
         let place = |name: &str| step::all().position(|step| step.name == name);
         self.steps.sort_by_key(|record| place(&record.step));
+    }
+
+    /// Nothing is known of a step any more, nor of those that it guards: these were measured under what it found before.
+    /// True if anything was.
+    pub fn forget(&mut self, step: &Step) -> bool {
+        let known = self.steps.len();
+        let is_guarded = |record: &Record| {
+            let guards = step::named(&record.step).map(|of| &of.guarded_by);
+            guards.is_some_and(|guards| guards.contains(&step.name))
+        };
+        self.steps
+            .retain(|record| record.step != step.name && !is_guarded(record));
+        self.steps.len() < known
     }
 
     /// The step that has to pass before `step` is harmless, and has not.
@@ -248,6 +261,15 @@ mod tests {
             progress.put(step(guard), Outcome::Passed, None, Vec::new(), 0.0);
             assert_eq!(progress.unguarded(finger), next);
         }
+        // Another film: what leaked through the one before tells nothing.
+        progress.put(step("insulation"), Outcome::Passed, None, Vec::new(), 0.0);
+        assert_eq!(progress.unguarded(finger), Some("leakage"));
+        progress.put(step("leakage"), Outcome::Passed, None, Vec::new(), 0.0);
+        assert_eq!(progress.unguarded(finger), None);
+        // Who leaves while it is measured has not measured it.
+        assert!(progress.forget(step("leakage")));
+        assert_eq!(progress.unguarded(finger), Some("leakage"));
+        assert!(!progress.forget(step("leakage")));
         let order: Vec<&str> = progress
             .steps
             .iter()

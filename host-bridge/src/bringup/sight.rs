@@ -70,12 +70,16 @@ impl Track {
             instant_us,
             position_um,
         };
-        // A board that has started anew begins again.
-        if self.last.is_some_and(|last| point.sequence < last.sequence) {
+        if self.begins_again(sequence) {
             self.first = None;
         }
         self.first = self.first.or(Some(point));
         self.last = Some(point);
+    }
+
+    /// Whether a board that counts so has started anew.
+    fn begins_again(&self, sequence: u32) -> bool {
+        self.last.is_some_and(|last| sequence < last.sequence)
     }
 
     fn ends(&self) -> Option<(Point, Point)> {
@@ -292,6 +296,12 @@ impl Observer for Watcher {
         let sight = &mut self.sight;
         match message {
             Message::Motion(motion) => {
+                if sight.hand.begins_again(motion.sequence) {
+                    // The display has started anew, with its own amplitude.
+                    sight.amplitude = None;
+                    self.in_force = None;
+                    self.has_ordered = false;
+                }
                 sight
                     .hand
                     .go(motion.sequence, motion.instant_us, motion.position_um);
@@ -396,9 +406,51 @@ impl Watcher {
 
 #[cfg(test)]
 mod tests {
-    use protocol::Refusal;
+    use protocol::{Motion, Refusal};
 
     use super::*;
+
+    #[test]
+    fn an_amplitude_is_not_in_force_any_more_once_the_display_has_started_anew() {
+        let mut watcher = Watcher {
+            sight: Sight::default(),
+            wanted: Wanted {
+                span_s: 1.0,
+                amplitude_mv: Some(1_000),
+            },
+            asked: 0,
+            heard: [0; 2],
+            in_force: None,
+            has_ordered: false,
+        };
+        let motion = |sequence| {
+            Message::Motion(Motion {
+                sequence,
+                instant_us: 0,
+                position_um: 0,
+                velocity_um_s: 0,
+            })
+        };
+        let configuration = Configuration::Display(DisplayConfiguration {
+            amplitude_mv: 1_000,
+            ..DisplayConfiguration::DEFAULT
+        });
+        watcher.hear(Role::Display, &motion(70));
+        let report = ConfigurationReport {
+            refused: None,
+            hash: configuration.hash(),
+            configuration,
+        };
+        watcher.hear(Role::Display, &Message::Configuration(report));
+        watcher.hear(Role::Display, &motion(71));
+        assert_eq!(watcher.sight.amplitude, Some(Ok(1_000)));
+        assert!(watcher.is_configured());
+        watcher.hear(Role::Display, &motion(0));
+        assert_eq!(watcher.sight.amplitude, None);
+        assert!(!watcher.is_configured());
+        let asks = Message::Question(Question::Configuration);
+        assert_eq!(watcher.order(1_000), asks);
+    }
 
     #[test]
     fn a_refusal_that_answers_somebody_else_is_none() {

@@ -169,7 +169,7 @@ enum Answer {
 impl Session<'_> {
     /// Measures every step of `due` in one look; true if it was not interrupted.
     fn measure_all(&mut self, due: &[&'static Step]) -> anyhow::Result<bool> {
-        let sets_amplitude = due.iter().any(|step| step.sets_amplitude);
+        let sets_amplitude = due.iter().any(|step| step.sets_amplitude && !step.asks());
         let sight = self.look(sets_amplitude);
         if self.desk.is_ended() {
             return Ok(false);
@@ -224,6 +224,9 @@ impl Session<'_> {
                         break;
                     }
                     Answer::Measure => {
+                        if self.progress.forget(step) {
+                            self.save()?;
+                        }
                         let sight = self.look(step.sets_amplitude);
                         if self.desk.is_ended() {
                             return Ok(false);

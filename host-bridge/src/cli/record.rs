@@ -1,6 +1,5 @@
 //! `host-bridge record`.
 
-use std::collections::VecDeque;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -92,7 +91,7 @@ pub struct Record {
     boards: super::Where,
 }
 
-/// Most events that wait for a recorder that is about to start: some 10 s of both boards.
+/// Most messages that wait for a recorder that is about to start: some 10 s of both boards.
 const MOST_WAITING: usize = 10_000;
 
 /// Hears the boards from before there is a recorder.
@@ -101,13 +100,13 @@ struct Ear(Mutex<Heard>);
 
 enum Heard {
     /// Nobody has begun to record: what was heard so far.
-    Waiting(VecDeque<(Role, Event)>),
+    Waiting(Vec<(Role, Event)>),
     By(Arc<Recorder>),
 }
 
 impl Default for Heard {
     fn default() -> Self {
-        Self::Waiting(VecDeque::new())
+        Self::Waiting(Vec::new())
     }
 }
 
@@ -116,10 +115,11 @@ impl Ear {
         match &mut *locked(&self.0) {
             Heard::By(recorder) => recorder.on_event(role, event),
             Heard::Waiting(events) => {
-                if events.len() >= MOST_WAITING {
-                    events.pop_front();
+                // What is missing shows by the messages' own numbers; how a link stands does not.
+                let is_word = matches!(event, Event::Heard { .. });
+                if !is_word || events.len() < MOST_WAITING {
+                    events.push((role, event.clone()));
                 }
-                events.push_back((role, event.clone()));
             }
         }
     }

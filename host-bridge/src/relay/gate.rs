@@ -111,6 +111,11 @@ impl Gate {
         self.holder.is_some_and(|holder| holder.session == session)
     }
 
+    /// Whether a bridge holds the stream that was heard of late.
+    pub fn is_held(&self, now_us: u64) -> bool {
+        self.holder.is_some_and(|holder| !holder.is_silent(now_us))
+    }
+
     /// The bridge of `session` was heard at `now_us`. It gets the stream if nobody holds it, or if who holds it
     /// has not been heard for [`LEASE_US`]: true if it got it just now. Who has left never gets it again.
     pub fn ask(&mut self, session: u64, now_us: u64) -> bool {

@@ -111,12 +111,22 @@ impl Inward {
                 return Heard::Nothing;
             }
         };
-        if !envelope.hello.is_compatible() {
-            // Of another build: a Stop all the same. What it says of its board stands for no board that is held here.
-            return match envelope.content {
-                Content::Stop { id, stop } => Heard::Stop(id, stop),
-                _ => Heard::Nothing,
-            };
+        // What every build says alike tells nothing of the build: it neither asks for the bench nor keeps it.
+        match envelope.content {
+            Content::Stop { id, stop } => return Heard::Stop(id, stop),
+            // Only of the board that is held, or of any where none is: anybody could say so.
+            Content::Stopped { id, trip } => {
+                let is_of_holder = self.gate.is_holder(envelope.session);
+                let is_believed = is_of_holder || !self.gate.is_held(now_us);
+                return if is_believed {
+                    Heard::Stopped(id, trip)
+                } else {
+                    Heard::Nothing
+                };
+            }
+            // It is said again, until it is done.
+            Content::Stopping { .. } => return Heard::Nothing,
+            _ => {}
         }
         self.greet(&envelope, now_us, &mut tell);
         let is_holder = self.gate.is_holder(envelope.session);
@@ -132,12 +142,9 @@ impl Inward {
                 let answer = is_ours.then(|| self.on_pong(&pong, now_us)).flatten();
                 answer.map_or(Heard::Nothing, |answer| Heard::Answered { answer, holds })
             }
-            Content::Stop { id, stop } => Heard::Stop(id, stop),
             Content::Watch => Heard::Watched,
             Content::Greeting(hello) if is_holder => Heard::Greeting(hello),
             Content::Shown(message) if is_holder => Heard::Shown(message),
-            // Only of the board that is held: anybody could say so.
-            Content::Stopped { id, trip } if is_holder => Heard::Stopped(id, trip),
             Content::Leaving => {
                 self.gate.leave(envelope.session);
                 Heard::Nothing
@@ -145,12 +152,13 @@ impl Inward {
             Content::HandOver => {
                 if self.gate.hand_over(envelope.session, now_us) {
                     self.begin(now_us);
+                    self.watcher = Bystander::default();
                     tell(Notice::HandedOver(self.role));
                 }
                 Heard::Nothing
             }
-            // It is said again, until it is done.
-            Content::Stopped { .. }
+            Content::Stop { .. }
+            | Content::Stopped { .. }
             | Content::Stopping { .. }
             | Content::Greeting(_)
             | Content::Shown(_) => Heard::Nothing,
@@ -369,6 +377,19 @@ mod tests {
     use crate::relay::site::bridge_hello;
     use protocol::{Motion, StopReason};
 
+    /// What the bridge of the sensor's board says, of a build with that protocol.
+    fn said(protocol: u16, session: u64, content: Content) -> Envelope {
+        let mut hello = bridge_hello(Role::Sensor);
+        hello.protocol = protocol.to_le_bytes();
+        Envelope {
+            hello,
+            session,
+            counter: 1,
+            sent_us: 0,
+            content,
+        }
+    }
+
     fn outbox() -> Outbox {
         Outbox::new(SystemClock.notify())
     }
@@ -396,22 +417,45 @@ mod tests {
         };
         for (content, expected) in [
             (Content::Stop { id: 7, stop }, Heard::Stop(7, stop)),
-            (Content::Stopped { id: 7, trip: None }, Heard::Nothing),
+            (
+                Content::Stopped { id: 7, trip: None },
+                Heard::Stopped(7, None),
+            ),
             (Content::Leaving, Heard::Nothing),
         ] {
-            let mut hello = bridge_hello(Role::Sensor);
-            hello.protocol = 77_u16.to_le_bytes();
-            let envelope = Envelope {
-                hello,
-                session: 9,
-                counter: 1,
-                sent_us: 0,
-                content,
-            };
+            let envelope = said(77, 9, content);
             let heard = inward.hear(&envelope.to_bytes(), 0, |_| {});
             assert_eq!(heard, expected);
         }
         assert_eq!(inward.remote.state().word(), "foreign");
+        // Where a bridge of this build is heard, it alone is believed.
+        let own = protocol::PROTOCOL_VERSION;
+        let ping = Content::Ping(Ping { sent_us: 0 });
+        inward.hear(&said(own, 3, ping).to_bytes(), 0, |_| {});
+        for (protocol, session, expected) in [
+            (77, 9, Heard::Nothing),
+            (own, 9, Heard::Nothing),
+            (own, 3, Heard::Stopped(7, None)),
+        ] {
+            let stopped = said(protocol, session, Content::Stopped { id: 7, trip: None });
+            let heard = inward.hear(&stopped.to_bytes(), 0, |_| {});
+            assert_eq!(heard, expected, "{protocol} {session}");
+        }
+    }
+
+    /// It may be of a build whose envelopes are others, and whose boards are the same.
+    #[test]
+    fn a_stop_tells_nothing_of_the_build_and_asks_for_nothing() {
+        let mut inward = Inward::new(Role::Sensor, 1, Duration::from_secs(1));
+        let stop = Stop {
+            reason: StopReason::Operator,
+        };
+        let content = Content::Stop { id: 7, stop };
+        let envelope = said(protocol::PROTOCOL_VERSION, 9, content);
+        let heard = inward.hear(&envelope.to_bytes(), 0, |_| {});
+        assert_eq!(heard, Heard::Stop(7, stop));
+        assert_eq!(inward.remote.state().word(), "unheard");
+        assert!(!inward.gate.is_held(0));
     }
 
     #[test]

@@ -57,8 +57,7 @@ impl Device {
         let number = metadata.rdev();
         metadata.file_type().is_char_device().then(|| {
             let name = format!("port-{}-{}", libc::major(number), libc::minor(number));
-            let folder = folder_with(&candidates(), &name);
-            Self { folder, name }
+            Self::in_folder(name)
         })
     }
 
@@ -68,10 +67,12 @@ impl Device {
             'a'..='z' | 'A'..='Z' | '0'..='9' | '.' | '_' => letter,
             _ => '-',
         };
-        Self {
-            folder: folder(),
-            name: name.chars().map(plain).collect(),
-        }
+        Self::in_folder(name.chars().map(plain).collect())
+    }
+
+    fn in_folder(name: String) -> Self {
+        let folder = folder_with(&searched(), &candidates(), &name);
+        Self { folder, name }
     }
 
     /// Claims the port; `None` if another program has it. Fails if there is no folder to do so in.
@@ -123,9 +124,11 @@ impl Device {
 
 /// What stands in each lock that is held and whose name begins with `prefix`, by their names' order.
 pub fn held(prefix: &str) -> Vec<String> {
-    let files = folder().and_then(fs::read_dir);
-    let mut paths: Vec<PathBuf> = files
+    let folders = searched()
         .into_iter()
+        .filter(|folder| is_own(folder).is_ok());
+    let mut paths: Vec<PathBuf> = folders
+        .filter_map(|folder| fs::read_dir(folder).ok())
         .flatten()
         .flatten()
         .map(|entry| entry.path())
@@ -135,6 +138,7 @@ pub fn held(prefix: &str) -> Vec<String> {
         })
         .collect();
     paths.sort();
+    paths.dedup();
     let words = |path: PathBuf| {
         let mut file = File::open(path).ok()?;
         // Shared, so that two who look at once don't take each other for its holder.
@@ -162,43 +166,43 @@ fn own_name() -> String {
     )
 }
 
-/// The user's folder for what lives no longer than his programs: where the system has one for that, or else where
-/// temporary files go.
-fn folder() -> io::Result<PathBuf> {
-    first_usable(&candidates())
-}
-
-/// Where that may be, the best first. A service and a session of one user need not be told of the same places.
+/// The user's folders for what lives no longer than his programs, the best first: where the system has one for that, or else
+/// where temporary files go.
 fn candidates() -> Vec<PathBuf> {
-    let user = getuid().as_raw();
-    let temporary = format!("ridgelink-{user}");
+    let temporary = format!("ridgelink-{}", getuid().as_raw());
     let of_session = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty());
     let of_session = of_session.map(|folder| Path::new(&folder).join("ridgelink"));
-    let of_user = Path::new("/run/user")
-        .join(user.to_string())
-        .join("ridgelink");
     let others = [std::env::temp_dir(), PathBuf::from("/tmp")];
     let others = others.map(|folder| folder.join(&temporary));
-    of_session
-        .into_iter()
-        .chain([of_user])
-        .chain(others)
-        .collect()
+    of_session.into_iter().chain(others).collect()
+}
+
+/// Where another program of this user may have its locks: a service is not told of the same folder as a session, whose own
+/// goes when he leaves.
+fn searched() -> Vec<PathBuf> {
+    let of_user = format!("/run/user/{}/ridgelink", getuid().as_raw());
+    let mut folders = candidates();
+    folders.push(of_user.into());
+    folders
 }
 
 /// The one in which the lock called `name` is held, by a program that has found another one than this would; else the first
 /// that can be used. Fails as [`first_usable`] does.
-fn folder_with(folders: &[PathBuf], name: &str) -> io::Result<PathBuf> {
+fn folder_with(searched: &[PathBuf], usable: &[PathBuf], name: &str) -> io::Result<PathBuf> {
     let holds = |folder: &&PathBuf| {
         let is_own = is_own(folder).is_ok();
         let lock = is_own.then(|| File::open(folder.join(format!("{name}.lock"))));
-        // Shared, so that two who look at once don't take each other for its holder. Closing the file gives it up.
-        let held = |file: File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
+        // Shared, so that two who look at once don't take each other for its holder.
+        let held = |file: File| {
+            let is_held = matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
+            let _ = file.unlock();
+            is_held
+        };
         lock.and_then(Result::ok).is_some_and(held)
     };
-    match folders.iter().find(holds) {
+    match searched.iter().find(holds) {
         Some(folder) => Ok(folder.clone()),
-        None => first_usable(folders),
+        None => first_usable(usable),
     }
 }
 
@@ -269,7 +273,7 @@ mod tests {
         });
         let folders = [session.clone(), service.clone()];
         let device = |folders: &[PathBuf]| Device {
-            folder: folder_with(folders, "port-1-2"),
+            folder: folder_with(folders, folders, "port-1-2"),
             name: "port-1-2".to_owned(),
         };
         let claim = device(&folders[1..])

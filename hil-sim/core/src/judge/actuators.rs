@@ -179,9 +179,11 @@ impl Judge {
                     self.standing.add(&edge);
                     let felt = match &mut self.displacement {
                         Some(displacement) => displacement.at(edge.t_s, volts),
-                        None => volts,
+                        None => Some(volts),
                     };
-                    self.demodulator.add(due, felt);
+                    if let Some(felt) = felt {
+                        self.demodulator.add(due, felt);
+                    }
                     let point = Point {
                         edge,
                         volts,

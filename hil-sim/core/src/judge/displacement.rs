@@ -27,8 +27,8 @@ impl Displacement {
         })
     }
 
-    /// The displacement at the next point, in V.
-    pub fn at(&mut self, t_s: f64, volts: f64) -> f64 {
+    /// The displacement at the next point, in V; none where the voltage stays at 0: then it swings out, which is no stimulus.
+    pub fn at(&mut self, t_s: f64, volts: f64) -> Option<f64> {
         let (from_s, from_v, moved_v, slope) = self.last.unwrap_or((t_s, volts, volts, 0.0));
         let passed_s = t_s - from_s;
         let next = if passed_s > 0.0 {
@@ -37,8 +37,11 @@ impl Displacement {
             (moved_v, slope)
         };
         self.last = Some((t_s, volts, next.0, next.1));
-        self.largest_v = self.largest_v.max(next.0.abs());
-        next.0
+        let is_driven = from_v != 0.0 || volts != 0.0;
+        is_driven.then(|| {
+            self.largest_v = self.largest_v.max(next.0.abs());
+            next.0
+        })
     }
 
     /// The largest so far, in V.
@@ -100,7 +103,7 @@ mod tests {
                     let t_s = f64::from(step) * 5e-4;
                     let angle = TAU * hz * t_s;
                     let v = moved.at(t_s, angle.sin());
-                    if step > 4_000 {
+                    if let Some(v) = v.filter(|_| step > 4_000) {
                         // Straight lines between points 0.5 ms apart are a little less than the sine.
                         let due = gain * (angle - lag).sin();
                         assert!(
@@ -113,12 +116,37 @@ mod tests {
         }
     }
 
+    /// A wave of 100 Hz is hardly followed at a resonance of 30 Hz, and what swings out after it is much larger.
+    #[test]
+    fn what_swings_out_after_the_stimulus_does_not_count() {
+        let mut moved = of(300, 20);
+        let mut driven_v: f64 = 0.0;
+        for step in 0..4_000_u32 {
+            let t_s = f64::from(step) * 5e-4;
+            let volts = if step < 2_005 {
+                (TAU * 100.0 * t_s).sin()
+            } else {
+                0.0
+            };
+            let v = moved.at(t_s, volts);
+            if (1_000..2_000).contains(&step) {
+                driven_v = driven_v.max(v.expect("it is driven").abs());
+            }
+            assert_eq!(v.is_none(), step >= 2_006 || step == 0, "{step}");
+        }
+        let (.., ring_v, _) = moved.last.expect("it was driven");
+        assert!(
+            ring_v.abs() < 1e-3 && driven_v < 0.11,
+            "{ring_v} {driven_v}"
+        );
+    }
+
     #[test]
     fn a_standing_voltage_is_reached_whole_and_without_a_response_there_is_none() {
         let mut moved = of(600, 70);
-        assert_eq!(moved.at(0.0, 0.0), 0.0);
+        assert_eq!(moved.at(0.0, 0.0), None);
         moved.at(1e-3, 2.0);
-        assert!((moved.at(1.0, 2.0) - 2.0).abs() < 1e-9);
+        assert!((moved.at(1.0, 2.0).expect("it is driven") - 2.0).abs() < 1e-9);
         assert!((2.0..2.2).contains(&moved.largest_v()), "{moved:?}");
         assert!(Displacement::of(&DEFAULT_ACTUATORS[0]).is_none());
     }

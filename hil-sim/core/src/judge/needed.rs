@@ -22,6 +22,8 @@ pub const LIMEN_DB: f64 = 2.2;
 pub const WEBER: f64 = 0.18;
 /// λ that differs by more than this share is another surface's.
 const ANOTHER: f64 = 0.1;
+/// A surface of which no more than one in so many textures tells is passed over: a first λ may be wrong.
+const SELDOM: usize = 10;
 /// What is felt as vibration, in Hz.
 const FELT_HZ: std::ops::RangeInclusive<f64> = 2.0..=200.0;
 
@@ -47,6 +49,15 @@ impl Rendering {
     }
 }
 
+/// A surface.
+#[derive(Clone, Copy, Debug)]
+struct Surface {
+    wavelength_mm: f64,
+    /// What was told of it last, and how often something was.
+    texture: Texture,
+    told: usize,
+}
+
 impl From<Rendering> for protocol::Rendering {
     fn from(rendering: Rendering) -> Self {
         match rendering {
@@ -61,9 +72,9 @@ impl From<Rendering> for protocol::Rendering {
 #[derive(Clone, Debug)]
 pub struct Judge {
     actuators: [Actuator; ACTUATORS],
-    wavelength_mm: Option<f64>,
-    /// Of each surface its λ and what was told of it last.
-    surfaces: Vec<(f64, Texture)>,
+    /// Of the last valid estimate: its number, and λ.
+    wavelength_mm: Option<(u32, f64)>,
+    surfaces: Vec<Surface>,
     /// The hand at the last tick, in ns and mm.
     hand: Option<(u64, f64)>,
     moving_s: f64,
@@ -87,10 +98,13 @@ impl Judge {
     pub fn said(&mut self, role: Role, said: &TimedMessage) {
         match &said.message {
             Message::Estimate(estimate) if role == Role::Sensor && estimate.valid => {
-                self.wavelength_mm = estimate.wavelength_mm.map(f64::from);
+                let wavelength_mm = estimate.wavelength_mm.map(f64::from);
+                self.wavelength_mm = wavelength_mm.map(|mm| (estimate.sequence, mm));
             }
             Message::Texture(texture) if role == Role::Sensor && texture.valid => {
-                if let Some(wavelength_mm) = self.wavelength_mm {
+                if let Some((sequence, wavelength_mm)) = self.wavelength_mm
+                    && sequence == texture.sequence
+                {
                     self.told(wavelength_mm, *texture);
                 }
             }
@@ -99,12 +113,22 @@ impl Judge {
     }
 
     fn told(&mut self, wavelength_mm: f64, texture: Texture) {
-        let is_the_same =
-            |known: &&mut (f64, Texture)| (wavelength_mm / known.0 - 1.0).abs() <= ANOTHER;
-        match self.surfaces.iter_mut().find(is_the_same) {
-            Some(known) => *known = (wavelength_mm, texture),
-            None => self.surfaces.push((wavelength_mm, texture)),
-        }
+        let is_it =
+            |known: &&mut Surface| (wavelength_mm / known.wavelength_mm - 1.0).abs() <= ANOTHER;
+        let told = match self.surfaces.iter_mut().find(is_it) {
+            Some(known) => {
+                known.texture = texture;
+                known.wavelength_mm = wavelength_mm;
+                known.told += 1;
+                return;
+            }
+            None => 1,
+        };
+        self.surfaces.push(Surface {
+            wavelength_mm,
+            texture,
+            told,
+        });
     }
 
     /// A tick of the display's.
@@ -123,12 +147,19 @@ impl Judge {
     /// The rendering that the surface needs; none if the sensor told of no texture, or the hand did not move.
     pub fn finish(&self) -> Option<Rendering> {
         let speed_mm_s = self.travel_mm / self.moving_s;
-        let surfaces = self.surfaces.iter().filter(|_| speed_mm_s.is_finite());
-        surfaces
-            .filter_map(|(wavelength_mm, texture)| {
-                needed(&self.actuators, texture, *wavelength_mm, speed_mm_s)
-            })
-            .max()
+        let told: usize = self.surfaces.iter().map(|surface| surface.told).sum();
+        let is_passed_over = |surface: &&Surface| SELDOM * surface.told < told;
+        let counts = |surface: &&Surface| speed_mm_s.is_finite() && !is_passed_over(surface);
+        let needed = |surface: &Surface| {
+            let Surface {
+                wavelength_mm,
+                texture,
+                ..
+            } = surface;
+            needed(&self.actuators, texture, *wavelength_mm, speed_mm_s)
+        };
+        let surfaces = self.surfaces.iter().filter(counts);
+        surfaces.filter_map(needed).max()
     }
 }
 
@@ -314,5 +345,16 @@ mod tests {
             judge.said(Role::Sensor, &said(Message::Texture(told)));
             assert_eq!(judge.finish(), Some(expected), "{mm}");
         }
+        // One of another estimate's, and one that is told of seldom.
+        let late = Texture {
+            sequence: 7,
+            ..ridges
+        };
+        judge.said(Role::Sensor, &said(Message::Texture(late)));
+        assert_eq!(judge.surfaces.len(), 2);
+        for _ in 0..10 {
+            judge.told(2.0, sine);
+        }
+        assert_eq!(judge.finish(), Some(Rendering::Fundamental));
     }
 }

@@ -387,7 +387,10 @@ fn gained(rows: &[Row], engine: Engine, family: &str, rendering: Rendering) -> S
     }
     let of = |surface: &str, rendering| {
         let rows = rows.iter().filter(|row| {
-            row.engine == engine && row.surface == surface && row.rendering == rendering
+            row.engine == engine
+                && row.family == family
+                && row.surface == surface
+                && row.rendering == rendering
         });
         mean(rows.map(|row| row.coherence))
     };
@@ -452,7 +455,7 @@ impl Study for Measured {
             "rendering",
             "coherence:",
             "least to most:",
-            "gained, 95 % of surfaces:",
+            "gained (95 % of means):",
             "spectral distance, dB:",
         ];
         let mut rows = Vec::new();

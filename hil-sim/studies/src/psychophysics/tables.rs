@@ -1,5 +1,6 @@
 //! A study's tables, for a terminal and for a page, and all of it as text.
 
+use crate::output::rounded;
 use crate::psychophysics::DISCLAIMER;
 use crate::psychophysics::interval::{Interval, guessing, wilson};
 use crate::psychophysics::mosteller::{LEVEL, Test, critical};
@@ -9,7 +10,7 @@ use crate::psychophysics::published::{
     CHI_SQUARE, CRITICAL, FREEDOM, SAMPLES_MM, TABLE_3, TABLE_4,
 };
 use crate::psychophysics::study::{Compared, Study};
-use crate::study::{Record, Table, rounded, short};
+use crate::study::{Record, Table, short};
 
 fn fixed(value: f64, decimals: usize) -> String {
     rounded(value, decimals).replace('-', "−")

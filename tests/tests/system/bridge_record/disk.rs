@@ -178,11 +178,16 @@ fn a_disk_that_stands_still_holds_up_no_stop() {
     running.wait(LIMIT);
 }
 
-/// Nor where it stands still before there is a recording: nobody reads the pipe.
+/// Nor where it stands still before there is a recording: the pipe is full, and nobody reads it.
 #[test]
 fn a_disk_that_stands_still_from_the_start_holds_up_no_stop() {
     let path = folder("hung-at-once").join("hung.mcap");
     mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("it can be made");
+    let open =
+        |flags| open(&path, flags | OFlags::NONBLOCK, Mode::empty()).expect("it can be opened");
+    let _reader = open(OFlags::RDONLY);
+    let mut writer = File::from(open(OFlags::WRONLY));
+    while writer.write(&[0; 4096]).is_ok() {}
     let pair = Pair::new();
     let words = [path.to_str().expect("UTF-8"), "--force", "--no-gauges"];
     let running = pair.record(&mut bridge::command(), &words);

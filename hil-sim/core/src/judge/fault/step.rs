@@ -183,7 +183,7 @@ impl Step {
             };
             let mut volts = volts(edge.words[self.reference]);
             if let Some(displacement) = &mut self.displacement {
-                volts = displacement.at(edge.t_s, volts);
+                volts = displacement.at(edge.t_s, volts).unwrap_or(0.0);
             }
             let is_silent = edge.t_s >= from_s && self.notice_silence(&edge);
             if (before_s..from_s).contains(&edge.t_s) {

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::output::escape::escape;
 use crate::output::report::Chapter;
-use crate::study::rounded;
+use crate::output::rounded;
 use hil_sim_core::judge::JudgedEstimate;
 use hil_sim_core::judge::fault::Finding;
 use hil_sim_core::judge::reaction::Reaction;
