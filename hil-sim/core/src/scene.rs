@@ -121,12 +121,12 @@ impl Irregularity {
         seed: 1,
     };
 
-    /// A surface that gives a rendering all that it can play: a second partial of λ/2, and heights at random. The grating's
-    /// own shape has a third partial.
+    /// A surface that gives a rendering all that it can play: a second partial of λ/2, and heights at random, so low that λ can
+    /// be known. The grating's own shape has a third partial.
     pub fn rich(rendering: Rendering) -> Self {
         Self {
             random: if rendering == Rendering::Texture {
-                0.3
+                0.12
             } else {
                 0.0
             },

@@ -194,7 +194,8 @@ impl Plan {
     }
 }
 
-/// Two wavelengths in turn, further than a run goes, with all that the rendering can play.
+/// Two wavelengths in turn, further than a run goes; for a rendering that plays more than the fundamental one, with all that
+/// there is to play.
 fn surface(wavelengths_mm: [f64; 2], rendering: Rendering) -> Surface {
     const PIECES: usize = 100;
     let piece = |number: usize| Specimen {
@@ -209,7 +210,8 @@ fn surface(wavelengths_mm: [f64; 2], rendering: Rendering) -> Surface {
         irregularity: Irregularity::rich(rendering),
         ..Scene::constant(wavelengths_mm[0], 50.0).surface
     };
-    if wavelengths_mm[0] == wavelengths_mm[1] {
+    // Short fits of a rich wave may be off for a moment beyond a boundary: then a λ that no specimen has is no fault's doing.
+    if wavelengths_mm[0] == wavelengths_mm[1] || rendering != Rendering::Fundamental {
         return plain;
     }
     Surface {
