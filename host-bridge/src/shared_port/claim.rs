@@ -200,9 +200,13 @@ fn folder_with(searched: &[PathBuf], usable: &[PathBuf], name: &str) -> io::Resu
         };
         lock.and_then(Result::ok).is_some_and(held)
     };
-    match searched.iter().find(holds) {
+    let first = first_usable(usable);
+    let others = searched
+        .iter()
+        .filter(|other| first.as_ref().ok() != Some(other));
+    match others.into_iter().find(holds) {
         Some(folder) => Ok(folder.clone()),
-        None => first_usable(usable),
+        None => first,
     }
 }
 

@@ -19,6 +19,9 @@ use tests::utterance::Speaker;
 
 use super::{LIMIT, Pair, entries, folder, signal};
 
+/// Its number on Linux.
+const SIGUSR1: u32 = 10;
+
 /// Samples that fill no disk of these tests.
 const SOME: u32 = 800;
 
@@ -178,6 +181,14 @@ fn a_disk_that_stands_still_holds_up_no_stop() {
     running.wait(LIMIT);
 }
 
+/// Whether a process has a handler for SIGUSR1: before that it would end it.
+fn catches_usr1(process: u32) -> bool {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (SIGUSR1 - 1) & 1 == 1)
+}
+
 /// Nor where it stands still before there is a recording: the pipe is full, and nobody reads it.
 #[test]
 fn a_disk_that_stands_still_from_the_start_holds_up_no_stop() {
@@ -191,17 +202,14 @@ fn a_disk_that_stands_still_from_the_start_holds_up_no_stop() {
     let pair = Pair::new();
     let words = [path.to_str().expect("UTF-8"), "--force", "--no-gauges"];
     let running = pair.record(&mut bridge::command(), &words);
-    let hears = |role: Role, is_due: fn(&Message) -> bool| {
-        let board = pair.board(role);
-        let is_heard = wait_until(LIMIT, || board.take_heard().iter().any(is_due));
-        assert!(is_heard, "the {}", role.name());
-    };
-    for role in [Role::Sensor, Role::Display] {
-        hears(role, |message| matches!(message, Message::Hello(_)));
-    }
+    let is_caught = wait_until(LIMIT, || catches_usr1(running.child.id()));
+    assert!(is_caught, "it hears signals");
     signal(&running, "-USR1");
     for role in [Role::Sensor, Role::Display] {
-        hears(role, |message| matches!(message, Message::Stop(_)));
+        let board = pair.board(role);
+        let is_stop = |message: &Message| matches!(message, Message::Stop(_));
+        let is_told = wait_until(LIMIT, || board.take_heard().iter().any(is_stop));
+        assert!(is_told, "the {}", role.name());
     }
     signal(&running, "-KILL");
     running.wait(LIMIT);
