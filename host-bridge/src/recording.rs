@@ -70,30 +70,54 @@ pub struct Progress {
 type Taking = (Role, u64, Box<Note>);
 type Writer = JoinHandle<Result<Progress, RecordingError>>;
 
-/// A recording under way. Dropping it ends it without a word; [`Recorder::stop`] says how it went.
+/// A recording. By default it has no files yet, and keeps what it is told until [`Recorder::open`] makes them, or its queue is
+/// full. Dropping it ends it without a word; [`Recorder::stop`] says how it went.
 pub struct Recorder {
     notes: Input<Taking>,
+    /// The other end of the queue, until there are files.
+    waiting: Mutex<Option<Output<Taking>>>,
     progress: Arc<Mutex<Progress>>,
     writer: Mutex<Option<Writer>>,
+}
+
+impl Default for Recorder {
+    fn default() -> Self {
+        let (notes, waiting) = queue(PATIENCE);
+        Self {
+            notes,
+            waiting: Mutex::new(Some(waiting)),
+            progress: Arc::default(),
+            writer: Mutex::default(),
+        }
+    }
 }
 
 impl Recorder {
     /// Makes the files and begins to record. Fails if there are such files already, or they can't be made.
     pub fn start(settings: Settings) -> Result<Self, RecordingError> {
+        let recorder = Self::default();
+        recorder.open(settings)?;
+        Ok(recorder)
+    }
+
+    /// Makes the files and begins to write, first of all what was told before; does nothing if that was done already. Fails as
+    /// [`Recorder::start`] does.
+    pub fn open(&self, settings: Settings) -> Result<(), RecordingError> {
+        if locked(&self.waiting).is_none() {
+            return Ok(());
+        }
+        // Not under the lock: a disk may hang.
         let files = RecordingFiles::open(settings)?;
-        let (notes, waiting) = queue(PATIENCE);
-        let progress = Arc::<Mutex<Progress>>::default();
-        let writer_thread = WriterThread {
-            waiting,
-            progress: Arc::clone(&progress),
-            files,
-            row_builder: RowBuilder::default(),
-        };
-        Ok(Self {
-            notes,
-            progress,
-            writer: Mutex::new(Some(thread::spawn(|| writer_thread.run()))),
-        })
+        if let Some(waiting) = locked(&self.waiting).take() {
+            let writer_thread = WriterThread {
+                waiting,
+                progress: Arc::clone(&self.progress),
+                files,
+                row_builder: RowBuilder::default(),
+            };
+            *locked(&self.writer) = Some(thread::spawn(|| writer_thread.run()));
+        }
+        Ok(())
     }
 
     /// Takes what the link to the board of `role` tells: to be called from the link's thread, which it does
@@ -306,12 +330,8 @@ mod tests {
 
     #[test]
     fn a_writer_that_panicked_has_failed() {
-        let (notes, _waiting) = queue(PATIENCE);
-        let recorder = Recorder {
-            notes,
-            progress: Arc::default(),
-            writer: Mutex::new(Some(thread::spawn(|| panic!("as a test wants it")))),
-        };
+        let recorder = Recorder::default();
+        *locked(&recorder.writer) = Some(thread::spawn(|| panic!("as a test wants it")));
         let end = Instant::now() + LIMIT;
         while !recorder.progress().failed && Instant::now() < end {
             thread::park_timeout(Duration::from_millis(1));
@@ -320,10 +340,38 @@ mod tests {
         assert!(matches!(recorder.stop(), Err(RecordingError::Died)));
     }
 
+    /// A folder of a test's own, which is not there.
+    fn folder(name: &str) -> PathBuf {
+        let name = format!("ridgelink-{}-{name}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        let _ = std::fs::remove_dir_all(&folder);
+        folder
+    }
+
+    #[test]
+    fn what_was_heard_before_there_were_files_is_written_and_they_are_made_once() {
+        let folder = folder("before");
+        let settings = |name: &str| Settings {
+            csv: Some(folder.join(name)),
+            ..Settings::default()
+        };
+        std::fs::create_dir_all(&folder).expect("it can be made");
+        let recorder = Recorder::default();
+        (0..10).for_each(|at_us| recorder.on_event(Role::Display, &heard(at_us)));
+        for name in ["first", "second"] {
+            let opened = recorder.open(settings(name));
+            opened.unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+        recorder.on_event(Role::Display, &heard(10));
+        let ended = recorder.stop().unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((ended.tally.messages, ended.tally.unwritten), (11, 0));
+        assert!(folder.join("first").is_dir() && !folder.join("second").exists());
+        std::fs::remove_dir_all(&folder).expect("the folder is there");
+    }
+
     #[test]
     fn what_was_heard_is_safe_within_a_second_and_so_counted() {
-        let folder = std::env::temp_dir().join(format!("ridgelink-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&folder);
+        let folder = folder("counted");
         let recorder = Recorder::start(Settings {
             csv: Some(folder.clone()),
             ..Settings::default()

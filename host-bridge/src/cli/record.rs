@@ -91,51 +91,6 @@ pub struct Record {
     boards: super::Where,
 }
 
-/// Most messages that wait for a recorder that is about to start: some 10 s of both boards.
-const MOST_WAITING: usize = 10_000;
-
-/// Hears the boards from before there is a recorder.
-#[derive(Default)]
-struct Ear(Mutex<Heard>);
-
-enum Heard {
-    /// Nobody has begun to record: what was heard so far.
-    Waiting(Vec<(Role, Event)>),
-    By(Arc<Recorder>),
-}
-
-impl Default for Heard {
-    fn default() -> Self {
-        Self::Waiting(Vec::new())
-    }
-}
-
-impl Ear {
-    fn on_event(&self, role: Role, event: &Event) {
-        match &mut *locked(&self.0) {
-            Heard::By(recorder) => recorder.on_event(role, event),
-            Heard::Waiting(events) => {
-                // What is missing shows by the messages' own numbers; how a link stands does not.
-                let is_word = matches!(event, Event::Heard { .. });
-                if !is_word || events.len() < MOST_WAITING {
-                    events.push((role, event.clone()));
-                }
-            }
-        }
-    }
-
-    /// The recorder is there: it gets all that was heard, in its order.
-    fn begin(&self, recorder: &Arc<Recorder>) {
-        let mut heard = locked(&self.0);
-        if let Heard::Waiting(events) = &*heard {
-            for (role, event) in events {
-                recorder.on_event(*role, event);
-            }
-        }
-        *heard = Heard::By(Arc::clone(recorder));
-    }
-}
-
 impl Record {
     /// Records.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
@@ -149,8 +104,8 @@ impl Record {
         // Before there is a file: an old one is not to go for a log that can't be read.
         follow(&bench, &roles, &logs)?;
         let (events, told) = channel();
-        let ear = Arc::new(Ear::default());
-        let recording = Arc::clone(&ear);
+        let recorder = Arc::new(Recorder::default());
+        let recording = Arc::clone(&recorder);
         let presence = Arc::new(Mutex::new(Presence::default()));
         let theirs = Arc::clone(&presence);
         let links = super::links(&bench, move |role, event| {
@@ -168,15 +123,14 @@ impl Record {
             let _ = said.send(());
         });
         // A disk that hangs holds up the recording, and no Stop.
-        let recorder = Arc::new(Recorder::start(Settings {
+        recorder.open(Settings {
             mcap: self.file.clone(),
             csv: self.csv.clone(),
             force: self.force,
             part: Some(part).filter(|part| !part.is_zero()),
-        })?);
+        })?;
         let started = Instant::now();
         let started_us = now_us();
-        ear.begin(&recorder);
         Session {
             recorder: &recorder,
             links: &links,
