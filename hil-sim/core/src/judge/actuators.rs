@@ -145,7 +145,7 @@ impl Judge {
             actuators.frequency_hz = finite(stretch.cycles as f64 / stretch.length_s);
             actuators.truth_hz = finite(stretch.travelled_cycles / stretch.length_s);
         }
-        let displaced = self.displacement.map(|moved| moved.largest_v());
+        let displaced = self.displacement.map(|moved| moved.amplitude_v());
         let error = self.demodulator.finish(displaced.unwrap_or(peak_v));
         actuators.phase_error_rms_cycles = error.map(|error| error.rms_cycles);
         actuators.phase_error_mean_cycles = error.map(|error| error.mean_cycles);

@@ -13,7 +13,9 @@ pub struct Displacement {
     damping: f64,
     /// The last point: when in s, the voltage in V, the displacement in V and its slope in V/s.
     last: Option<(f64, f64, f64, f64)>,
-    largest_v: f64,
+    /// ∫ displacement² dt while it is driven, in V² s, and how long that is in s.
+    square_v2_s: f64,
+    driven_s: f64,
 }
 
 impl Displacement {
@@ -23,7 +25,8 @@ impl Displacement {
             natural: TAU * f64::from(actuator.resonance_dhz) / 10.0,
             damping: f64::from(actuator.damping_percent) / 100.0,
             last: None,
-            largest_v: 0.0,
+            square_v2_s: 0.0,
+            driven_s: 0.0,
         })
     }
 
@@ -39,14 +42,21 @@ impl Displacement {
         self.last = Some((t_s, volts, next.0, next.1));
         let is_driven = from_v != 0.0 || volts != 0.0;
         is_driven.then(|| {
-            self.largest_v = self.largest_v.max(next.0.abs());
+            self.square_v2_s += next.0 * next.0 * passed_s;
+            self.driven_s += passed_s;
             next.0
         })
     }
 
-    /// The largest so far, in V.
-    pub const fn largest_v(&self) -> f64 {
-        self.largest_v
+    /// The amplitude of a sine of as much power as it has had while it was driven, in V; 0 before that. What swings out for a
+    /// moment hardly counts.
+    pub fn amplitude_v(&self) -> f64 {
+        let mean = self.square_v2_s / self.driven_s;
+        if mean.is_finite() {
+            (2.0 * mean).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Displacement and slope after so many s in which the voltage goes from one value to another.
@@ -116,11 +126,12 @@ mod tests {
         }
     }
 
-    /// A wave of 100 Hz is hardly followed at a resonance of 30 Hz, and what swings out after it is much larger.
+    /// A wave of 100 Hz is hardly followed at a resonance of 30 Hz, and what its end sets off swings out more widely than it ever
+    /// moved.
     #[test]
     fn what_swings_out_after_the_stimulus_does_not_count() {
         let mut moved = of(300, 20);
-        let mut driven_v: f64 = 0.0;
+        let [mut driven_v, mut ring_v] = [0.0_f64; 2];
         for step in 0..4_000_u32 {
             let t_s = f64::from(step) * 5e-4;
             let volts = if step < 2_005 {
@@ -132,13 +143,15 @@ mod tests {
             if (1_000..2_000).contains(&step) {
                 driven_v = driven_v.max(v.expect("it is driven").abs());
             }
+            if step > 2_005 {
+                ring_v = ring_v.max(moved.last.expect("it was driven").2.abs());
+            }
             assert_eq!(v.is_none(), step >= 2_006 || step == 0, "{step}");
         }
-        let (.., ring_v, _) = moved.last.expect("it was driven");
-        assert!(
-            ring_v.abs() < 1e-3 && driven_v < 0.11,
-            "{ring_v} {driven_v}"
-        );
+        assert!((0.09..0.11).contains(&driven_v), "{driven_v}");
+        assert!(ring_v > 2.0 * driven_v, "{ring_v} {driven_v}");
+        let amplitude_v = moved.amplitude_v();
+        assert!((0.09..0.12).contains(&amplitude_v), "{amplitude_v}");
     }
 
     #[test]
@@ -147,7 +160,6 @@ mod tests {
         assert_eq!(moved.at(0.0, 0.0), None);
         moved.at(1e-3, 2.0);
         assert!((moved.at(1.0, 2.0).expect("it is driven") - 2.0).abs() < 1e-9);
-        assert!((2.0..2.2).contains(&moved.largest_v()), "{moved:?}");
         assert!(Displacement::of(&DEFAULT_ACTUATORS[0]).is_none());
     }
 }

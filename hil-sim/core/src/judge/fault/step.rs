@@ -84,9 +84,9 @@ impl Step {
         }
     }
 
-    /// The largest of what is judged, in V.
-    fn peak_felt(&self) -> f64 {
-        let displaced = self.displacement.map(|moved| moved.largest_v());
+    /// The amplitude of what is judged, in V.
+    fn amplitude_v(&self) -> f64 {
+        let displaced = self.displacement.map(|moved| moved.amplitude_v());
         displaced.unwrap_or(self.peak_v)
     }
 
@@ -122,16 +122,16 @@ impl Step {
     fn end_stretch(&mut self) {
         let since = mem::replace(&mut self.since, Demodulator::new(self.rendering));
         // The mean of less than two groups would take away all that a group could tell.
-        let is_short = || since.clone().errors(self.peak_felt()).len() < 2 * TEXTURE_CYCLES;
+        let is_short = || since.clone().errors(self.amplitude_v()).len() < 2 * TEXTURE_CYCLES;
         if self.is_unplaced && self.rendering == Rendering::Texture && is_short() {
             return;
         }
         let standing = if self.is_unplaced {
-            since.clone().standing(self.peak_felt()).unwrap_or(0.0)
+            since.clone().standing(self.amplitude_v()).unwrap_or(0.0)
         } else {
             0.0
         };
-        let windows = since.errors(self.peak_felt()).into_iter();
+        let windows = since.errors(self.amplitude_v()).into_iter();
         self.errors.extend(windows.map(|mut window| {
             window.error_cycles -= standing;
             window.error_cycles -= window.error_cycles.round();
@@ -164,11 +164,11 @@ impl Step {
     /// a silence.
     fn stand(&mut self) -> f64 {
         let before = self.before.clone();
-        let cycles = || before.clone().errors(self.peak_felt()).len();
+        let cycles = || before.clone().errors(self.amplitude_v()).len();
         let known = match self.rendering {
             Rendering::Texture if cycles() < TEXTURE_CYCLES => None,
-            Rendering::Texture => before.standing(self.peak_felt()),
-            Rendering::Fundamental | Rendering::Shape => before.middle(self.peak_felt()),
+            Rendering::Texture => before.standing(self.amplitude_v()),
+            Rendering::Fundamental | Rendering::Shape => before.middle(self.amplitude_v()),
         };
         self.is_unplaced |= known.is_none();
         *self.standing.insert(known.unwrap_or(0.0))
