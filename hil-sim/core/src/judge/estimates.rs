@@ -2,10 +2,9 @@
 
 use std::collections::VecDeque;
 
-use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range};
+use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range, Rendering};
 use serde::Serialize;
 
-use crate::judge::needed::Rendering;
 use crate::judge::track::interpolate;
 use crate::judge::truth::Truth;
 use crate::judge::{MOTION_MM_S, finite, mean, seconds, words};
@@ -86,6 +85,7 @@ pub struct Summary {
     pub felt_wrong_share: Option<f64>,
     /// The rendering that the surface needs: see [`crate::judge::needed`]. None if no texture was told, or if only the
     /// estimates were judged.
+    #[serde(serialize_with = "crate::judge::needed::by_name")]
     pub rendering_needed: Option<Rendering>,
 }
 

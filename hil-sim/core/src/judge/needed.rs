@@ -6,9 +6,8 @@
 //! frequency. By the smallest limens that are found there, so that a doubt asks for more: 2.2 dB, and a Weber fraction of
 //! 0.18. Of several surfaces, the one that needs most counts.
 
-use protocol::{ACTUATORS, Actuator, Message, Role, Texture};
-use serde::Serialize;
-use strum::{IntoStaticStr, VariantArray};
+use protocol::{ACTUATORS, Actuator, Message, Rendering, Role, Texture};
+use serde::Serializer;
 
 use crate::judge::MOTION_MM_S;
 use crate::judge::truth::Truth;
@@ -22,32 +21,10 @@ pub const LIMEN_DB: f64 = 2.2;
 pub const WEBER: f64 = 0.18;
 /// λ that differs by more than this share is another surface's.
 const ANOTHER: f64 = 0.1;
-/// A surface of which no more than one in so many textures tells is passed over: a first λ may be wrong.
+/// A surface of which less than one in so many textures tells is passed over: a first λ may be wrong.
 const SELDOM: usize = 10;
 /// What is felt as vibration, in Hz.
 const FELT_HZ: std::ops::RangeInclusive<f64> = 2.0..=200.0;
-
-/// How much of the surface there is to be played.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Rendering {
-    /// The fundamental alone.
-    Fundamental,
-    /// With its partials.
-    Shape,
-    /// With what does not repeat.
-    Texture,
-}
-
-impl Rendering {
-    /// As scenes and the JSON have it.
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-}
 
 /// A surface.
 #[derive(Clone, Copy, Debug)]
@@ -56,16 +33,6 @@ struct Surface {
     /// What was told of it last, and how often something was.
     texture: Texture,
     told: usize,
-}
-
-impl From<Rendering> for protocol::Rendering {
-    fn from(rendering: Rendering) -> Self {
-        match rendering {
-            Rendering::Fundamental => Self::Fundamental,
-            Rendering::Shape => Self::Shape,
-            Rendering::Texture => Self::Texture,
-        }
-    }
 }
 
 /// Listens to the sensor and watches the hand.
@@ -159,7 +126,9 @@ impl Judge {
             needed(&self.actuators, texture, *wavelength_mm, speed_mm_s)
         };
         let surfaces = self.surfaces.iter().filter(counts);
-        surfaces.filter_map(needed).max()
+        surfaces
+            .filter_map(needed)
+            .max_by_key(|rendering| *rendering as u8)
     }
 }
 
@@ -170,25 +139,31 @@ fn needed(
     wavelength_mm: f64,
     speed_mm_s: f64,
 ) -> Option<Rendering> {
-    let played = Rendering::VARIANTS.iter().map(|&rendering| {
-        let lines = rendered::lines(
-            actuators,
-            rendering.into(),
-            texture,
-            wavelength_mm,
-            speed_mm_s,
-        );
-        Some((rendering, felt(&lines?)))
-    });
-    let played: Vec<(Rendering, (f64, f64))> = played.collect::<Option<_>>()?;
-    let is_enough = |(rendering, of_one): &&(Rendering, (f64, f64))| {
-        let mut more = played.iter().filter(|(more, _)| more > rendering);
-        !more.any(|(_, of_more)| differ(*of_one, *of_more))
+    let felt = |rendering| {
+        let lines = rendered::lines(actuators, rendering, texture, wavelength_mm, speed_mm_s);
+        lines.map(|lines| felt(&lines))
     };
-    played
-        .iter()
-        .find(is_enough)
-        .map(|(rendering, _)| *rendering)
+    let plain = felt(Rendering::Fundamental)?;
+    let shape = felt(Rendering::Shape)?;
+    let whole = felt(Rendering::Texture)?;
+    Some(if differ(shape, whole) {
+        Rendering::Texture
+    } else if differ(plain, shape) || differ(plain, whole) {
+        Rendering::Shape
+    } else {
+        Rendering::Fundamental
+    })
+}
+
+/// A rendering as scenes and the JSON have it.
+pub(super) fn by_name<S: Serializer>(
+    rendering: &Option<Rendering>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match rendering {
+        Some(rendering) => serializer.serialize_some(rendering.name()),
+        None => serializer.serialize_none(),
+    }
 }
 
 /// Whether a fingertip tells one from the other by power or by mean frequency.
