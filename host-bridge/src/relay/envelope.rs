@@ -442,7 +442,9 @@ mod tests {
         };
         let mut bytes = of(Role::Display, Content::Leaving).to_bytes();
         bytes.truncate(HEADER);
-        bytes.extend(postcard::to_allocvec(&Content::Stop { id: 7, stop }).expect("bytes"));
+        let mut room = [0; 64];
+        let said = postcard::to_slice(&Content::Stop { id: 7, stop }, &mut room);
+        bytes.extend_from_slice(said.expect("there is room"));
         assert_eq!(Envelope::from_bytes(&bytes), Err(EnvelopeError::Malformed));
     }
 
