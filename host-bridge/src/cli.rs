@@ -252,6 +252,7 @@ fn words(error: &anyhow::Error) -> String {
 impl Arguments {
     /// Does what was asked for. Fails if it can't be done.
     fn execute(self) -> anyhow::Result<ExitCode> {
+        signals::guard_halt()?;
         match self.command {
             Command::Flash(flash) => flash.execute(),
             Command::Monitor(monitor) => monitor.execute(),

@@ -9,7 +9,7 @@
 //! goes to the board as whole frames, numbered by the owner: to the board they are one host. Whoever holds the
 //! lock of [`claim`] owns the port. The system takes the lock from a program that ends, however it ends, and
 //! the first guest that notices becomes the owner. Its link stays as it is: what was missed meanwhile shows as
-//! frames lost.
+//! frames lost. An owner that is halted would take the port from everybody, Stop included: a guest that finds one lets it go on.
 //!
 //! Nothing listens beyond this computer, nor to other users: the sockets lie in a folder of the user's own.
 
@@ -186,6 +186,7 @@ impl Seat {
             if let Ok(Some(claim)) = self.device.claim() {
                 return self.own(claim).map(Part::Owner);
             }
+            self.device.wake_holder();
             match Guest::open(&self.device.socket()) {
                 Ok(guest) => return Ok(Part::Guest(Hearing::new(guest))),
                 Err(_) if Instant::now() >= until => {
@@ -346,6 +347,9 @@ impl SharedInput {
         };
         let is_quiet = hearing.joined.elapsed() >= SILENCE && hearing.heard.elapsed() >= SILENCE;
         if !is_quiet && hearing.guest.is_joined() {
+            return Ok(());
+        }
+        if self.seat.device.wake_holder() {
             return Ok(());
         }
         // There is an owner, and not the one that was joined.

@@ -5,10 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::link::{Link, stop_all};
+use crate::shared_port::claim::is_needed;
 use protocol::Role;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
+use signal_hook::low_level::emulate_default_handler;
+
+use super::output::say;
 
 /// What asks for an end; a terminal that goes away does.
 pub const USUAL: [i32; 4] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT];
@@ -41,6 +45,25 @@ impl Orders {
     pub fn obey(mut self, act: impl Fn() + Send + 'static) {
         std::thread::spawn(move || self.0.forever().for_each(|_| act()));
     }
+}
+
+/// Has Ctrl-Z halt this program only while no other one hears a board through it. Fails if the system does not let one listen
+/// to signals.
+pub fn guard_halt() -> io::Result<()> {
+    let mut halts = Signals::new([SIGTSTP])?;
+    std::thread::spawn(move || {
+        for signal in halts.forever() {
+            if is_needed() {
+                say(
+                    "Ctrl-Z does not halt it: other programs hear the boards through it. Ctrl-C ends it.",
+                );
+            } else {
+                // Nobody is harmed if it goes on.
+                let _ = emulate_default_handler(signal);
+            }
+        }
+    });
+    Ok(())
 }
 
 /// What a second signal does.

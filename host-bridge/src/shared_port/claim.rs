@@ -5,8 +5,18 @@ use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::{DirBuilderExt, FileExt, FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nix::unistd::getuid;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::{Pid, getuid};
+
+/// Locks that this program has.
+static HELD: AtomicUsize = AtomicUsize::new(0);
+
+/// Whether other programs hear a board through this one, or would.
+pub fn is_needed() -> bool {
+    HELD.load(Ordering::Relaxed) > 0
+}
 
 /// A port, whatever name it goes by.
 pub struct Device {
@@ -23,6 +33,7 @@ struct Lock(File);
 
 impl Drop for Lock {
     fn drop(&mut self) {
+        HELD.fetch_sub(1, Ordering::Relaxed);
         // If it can't be given up, it goes with the file, a little later.
         let _ = self.0.unlock();
     }
@@ -86,6 +97,7 @@ impl Device {
             .open(self.file("lock")?)?;
         match file.try_lock() {
             Ok(()) => {
+                HELD.fetch_add(1, Ordering::Relaxed);
                 let claim = Claim(Arc::new(Lock(file)));
                 // For people and messages: who it is. A full disk is no reason not to have the port.
                 let _ = claim.tell(&own_name());
@@ -107,6 +119,18 @@ impl Device {
             Ok(1..) => name,
             _ => "another program".to_owned(),
         }
+    }
+
+    /// Lets the program that has the port go on, if it is halted: others hear the board through it, and say Stop. Whether it
+    /// was. What else can't be done about it shows by its silence.
+    pub fn wake_holder(&self) -> bool {
+        let Ok(lock) = self.file("lock") else {
+            return false;
+        };
+        let number = process_of(&self.holder()).filter(|&number| is_halted(number));
+        // Its number may be another's by now.
+        let holder = number.filter(|&number| has_open(number, &lock));
+        holder.is_some_and(|number| kill(Pid::from_raw(number), Signal::SIGCONT).is_ok())
     }
 
     /// Where the owner is heard by others.
@@ -141,9 +165,7 @@ pub fn held(prefix: &str) -> Vec<String> {
     paths.dedup();
     let words = |path: PathBuf| {
         let mut file = File::open(path).ok()?;
-        // Shared, so that two who look at once don't take each other for its holder.
-        if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
-            let _ = file.unlock();
+        if !is_held(&file) {
             return None;
         }
         let mut words = String::new();
@@ -151,6 +173,15 @@ pub fn held(prefix: &str) -> Vec<String> {
         Some(words)
     };
     paths.into_iter().filter_map(words).collect()
+}
+
+/// Whether somebody holds the lock. Tried as a shared one, so that two who look at once don't take each other for its holder.
+fn is_held(lock: &File) -> bool {
+    let is_held = matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock));
+    if !is_held {
+        let _ = lock.unlock();
+    }
+    is_held
 }
 
 /// This program and its number, e.g. `host-bridge record (process 4711)`.
@@ -164,6 +195,26 @@ fn own_name() -> String {
         "{program} {} (process {process})",
         command.to_string_lossy()
     )
+}
+
+/// The process in a holder's words.
+fn process_of(holder: &str) -> Option<i32> {
+    let (_, number) = holder.rsplit_once("(process ")?;
+    number.strip_suffix(')')?.parse().ok()
+}
+
+/// Whether a process has been halted by a signal, as by Ctrl-Z, and not by a debugger.
+fn is_halted(process: i32) -> bool {
+    let facts = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // Behind the name in brackets, which may hold anything.
+    let state = facts.rsplit_once(')').map(|(_, behind)| behind);
+    state.is_some_and(|behind| behind.trim_start().starts_with('T'))
+}
+
+fn has_open(process: i32, path: &Path) -> bool {
+    let files = fs::read_dir(format!("/proc/{process}/fd"));
+    let mut files = files.into_iter().flatten().flatten();
+    files.any(|file| fs::read_link(file.path()).is_ok_and(|target| target == path))
 }
 
 /// The user's folders for what lives no longer than his programs, the best first: where the system has one for that, or else
@@ -192,13 +243,7 @@ fn folder_with(searched: &[PathBuf], usable: &[PathBuf], name: &str) -> io::Resu
     let holds = |folder: &&PathBuf| {
         let is_own = is_own(folder).is_ok();
         let lock = is_own.then(|| File::open(folder.join(format!("{name}.lock"))));
-        // Shared, so that two who look at once don't take each other for its holder.
-        let held = |file: File| {
-            let is_held = matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
-            let _ = file.unlock();
-            is_held
-        };
-        lock.and_then(Result::ok).is_some_and(held)
+        lock.and_then(Result::ok).is_some_and(|file| is_held(&file))
     };
     let first = first_usable(usable);
     let others = searched

@@ -1,8 +1,10 @@
 //! Boards that are not there, that come later, and that go and return.
 
 use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
 use std::os::unix::fs::symlink;
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use host_bridge::clock::{Clock, SystemClock};
@@ -328,4 +330,80 @@ fn a_recording_goes_on_when_the_program_that_owns_its_ports_is_killed() {
     for said in before.iter().chain(&after) {
         assert!(read.contains(said), "{said:?}");
     }
+}
+
+/// How the system has a process: `S` asleep, `T` halted, and so on.
+fn state(running: &Running) -> Option<char> {
+    let facts = fs::read_to_string(format!("/proc/{}/stat", running.child.id())).ok()?;
+    facts.rsplit_once(')')?.1.trim_start().chars().next()
+}
+
+#[test]
+fn a_program_that_is_halted_holds_up_no_stop_and_goes_on() {
+    let path = folder("halted").join("halted.mcap");
+    let pair = Pair::new();
+    let running = pair.record(
+        &mut bridge::command(),
+        &[path.to_str().expect("UTF-8"), "--no-gauges"],
+    );
+    pair.wait_for_questions();
+    signal(&running, "-STOP");
+    assert!(wait_until(LIMIT, || state(&running) == Some('T')));
+    let mut stop = bridge::command();
+    stop.args(["stop", "--within", "60", "--sensor"])
+        .arg(pair.sensor.path());
+    let ended = Running::start(stop.arg("--display").arg(pair.display.path())).wait(LIMIT);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert_ne!(state(&running), Some('T'));
+    signal(&running, "-INT");
+    succeeded(&running.wait(LIMIT));
+}
+
+#[test]
+fn who_hears_a_board_through_a_program_that_is_halted_lets_it_go_on() {
+    let folder = folder("halted-later");
+    let [first, second] = ["first.mcap", "second.mcap"].map(|name| folder.join(name));
+    let mut pair = Pair::new();
+    let record = |path: &Path| {
+        let words = [path.to_str().expect("UTF-8"), "--no-gauges"];
+        pair.record(&mut bridge::command(), &words)
+    };
+    let owner = record(&first);
+    pair.wait_for_questions();
+    let guest = record(&second);
+    pair.wait_until_both_hear();
+    signal(&owner, "-STOP");
+    assert!(wait_until(LIMIT, || state(&owner) == Some('T')));
+    assert!(wait_until(LIMIT, || state(&owner) != Some('T')));
+    pair.wait_until_both_hear();
+    for running in [owner, guest] {
+        signal(&running, "-INT");
+        succeeded(&running.wait(LIMIT));
+    }
+}
+
+#[test]
+fn ctrl_z_halts_no_program_that_others_hear_a_board_through() {
+    let path = folder("ctrl-z").join("a.mcap");
+    let pair = Pair::new();
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    let mut command = bridge::command();
+    command.arg("record").arg(&path);
+    command.arg("--sensor").arg(pair.sensor.path());
+    command.arg("--display").arg(pair.display.path());
+    let mut child = command.stderr(writer).spawn().expect("the program starts");
+    drop(command);
+    pair.wait_for_questions();
+    let send = |name: &str| {
+        let sent = Command::new("kill")
+            .args([name, &child.id().to_string()])
+            .status();
+        assert!(sent.is_ok_and(|status| status.success()), "{name}");
+    };
+    send("-TSTP");
+    let mut lines = BufReader::new(reader).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("Ctrl-Z does not halt it")));
+    send("-INT");
+    let status = child.wait().expect("it ends");
+    assert_eq!(status.code(), Some(0));
 }
