@@ -82,12 +82,14 @@ const LATEST_WAVES: f32 = 1.0 / 3.0;
 const LATEST_POWER: f32 = 0.05;
 /// Share over two waves from which on a wave is strong: its fit needs no average to lean on.
 const STRONG: f32 = 0.8;
-/// Estimates in a row that must find a weak wave that is not known yet before it is stood by: chance makes such a wave, and
-/// seldom twice the same.
+/// Estimates in a row that must find a wave that is not known yet before it is stood by, a weak one and a strong one: chance
+/// makes such a wave, and seldom twice the same.
 const TIMES: u8 = 5;
+/// See [`TIMES`].
+const TIMES_STRONG: u8 = 2;
 /// A supposition that moves by more than this share is another one.
 const SAME: f32 = 0.1;
-/// The line's memory in wavelengths, as the periodogram's.
+/// The line's memory in wavelengths.
 const MEMORY_WAVES: f32 = 8.0;
 /// Probability of a wave from which on it is the surface, once it has been there for a wavelength.
 const CONVINCING: f32 = 0.8;
@@ -139,7 +141,8 @@ pub struct Spectrum {
     /// ([`survey::STEPS_A_WAVE`]): as a byte it moves no other field, which would cost 30 instructions a millisecond.
     missing_steps: u8,
     weighed: Weighed,
-    /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before.
+    /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before. The share is forgotten where the
+    /// line goes: a surface that was clear says nothing of the next one.
     known_mm: f32,
     known_share: f32,
     /// The last λ̂ in mm, and how many times in a row it was probable enough: up to [`TIMES`].
@@ -301,12 +304,12 @@ impl Spectrum {
         }
         self.sure_times = (self.sure_times + u8::from(is_sure)).min(TIMES);
         self.sure_mm = said.wavelength_mm;
-        let at_once = said.new || fitted.share() > STRONG || !is_new;
-        let valid = is_sure && (at_once || self.sure_times == TIMES);
-        if valid {
-            self.known_mm = said.wavelength_mm;
-            self.known_share += 0.1 * (fitted.share() - self.known_share);
-        }
+        let times = if fitted.share() > STRONG {
+            TIMES_STRONG
+        } else {
+            TIMES
+        };
+        let valid = is_sure && (said.new || !is_new || self.sure_times >= times);
         Finding {
             wavelength_mm: Some(said.wavelength_mm).filter(|mm| mm.is_finite() && *mm > 0.0),
             valid,
@@ -353,13 +356,23 @@ fn misfits(fitted: &Fitted, usable: u8, valid: bool) -> u8 {
     }
 }
 
+/// Whether most `usable` gauges have the wave, and hardly anything else. A boundary passes them one after another, and those that
+/// it has not passed yet say nothing for or against.
+fn is_in_most(fitted: &Fitted, usable: u8) -> bool {
+    let strong = (0..GAUGES)
+        .filter(|&gauge| usable >> gauge & 1 == 1)
+        .filter(|&gauge| fitted.explaineds[gauge] > STRONG * fitted.totals[gauge])
+        .count();
+    2 * strong > usable.count_ones() as usize
+}
+
 /// Relative distance.
 fn off(one: f32, other: f32) -> f32 {
     (one / other - 1.0).abs()
 }
 
 impl Estimator for Spectrum {
-    /// Gathers knots, and works on the next estimate: the peaks five milliseconds before it, then the fits.
+    /// Gathers knots, and works on the next estimate: the peaks six milliseconds before it, then the fits.
     fn push(&mut self, touch: &Touch) {
         // A gauge that fails jumps, which is no sign of stick and slip.
         if touch.usable != self.touch.usable {
@@ -407,7 +420,11 @@ impl Estimator for Spectrum {
         let speed_mm_s = travel.velocity_mm_s(0).abs();
         self.speed_mm_s = larger(speed_mm_s, self.speed_mm_s * SPEED_KEPT);
         self.weighed = Weighed::default();
+        let was_gone = self.line.is_gone();
         let line = self.weigh_line();
+        if line.is_none() || self.line.is_gone() && !was_gone {
+            self.known_share = 0.0;
+        }
         let wave = self.weigh_wave().filter(|_| !self.line_goes_on());
         if wave.is_some() && self.wave.is_surface {
             self.begin_anew();
@@ -431,6 +448,11 @@ impl Estimator for Spectrum {
         };
         let mut finding = Finding { landed, ..finding };
         self.vibration.withhold(&mut finding, speed_mm_s);
+        if let Some(said) = said.filter(|_| finding.valid) {
+            let share = said.fitted.unwrap_or_default().share();
+            self.known_mm = said.wavelength_mm;
+            self.known_share += 0.1 * (share - self.known_share);
+        }
         finding
     }
 }

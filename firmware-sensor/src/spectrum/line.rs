@@ -267,6 +267,11 @@ impl Spectrum {
 }
 
 impl Line {
+    /// A strong line is not there any more.
+    pub(super) fn is_gone(&self) -> bool {
+        self.there < 0.5
+    }
+
     /// Goes on at `mm`.
     fn follow(&mut self, mm: f32, seen: &Seen) {
         let waves = seen.fresh_mm / mm;

@@ -508,3 +508,53 @@ fn what_shakes_the_sensor_is_no_surface_where_the_arm_swings() {
         assert_eq!(valid, 0, "{hz} Hz");
     }
 }
+
+/// Heights at random, blurred by the contact, with deviation 1, of x in mm from 0 to 80: what is longer than some mm is loudest.
+fn rough(seed: u64) -> impl Fn(f64) -> f64 {
+    const STEP_MM: f64 = 0.02;
+    let mut random = seed;
+    let keep = (-TAU * STEP_MM / 4.0).exp();
+    let (mut height, mut blurred) = (0.0, 0.0);
+    let heights = (0..5_000).map(|_| {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let even = (random >> 33) as f64 / f64::from(1_u32 << 31) - 0.5;
+        height = keep * height + (12.0 * (1.0 - keep * keep)).sqrt() * even;
+        blurred += 0.2 * (height - blurred);
+        blurred
+    });
+    let heights: Vec<f64> = heights.skip(1_000).collect();
+    move |x_mm| heights[((x_mm / STEP_MM) as usize).min(heights.len() - 1)]
+}
+
+/// What follows clear ridges is more often a surface than not, but it need not be a periodic one.
+#[test]
+fn behind_clear_ridges_a_rough_surface_is_no_wave() {
+    const BORDER_MM: f64 = 60.0;
+    let mut valid = [0.0; 2];
+    let seeds = 1..=16_u64;
+    for (of, ridges_mm) in [None, Some(4.0)].into_iter().enumerate() {
+        for seed in seeds.clone() {
+            let rough = rough(seed);
+            let felt = |gauge: usize, x_mm: f64, t_s: f64| match ridges_mm {
+                Some(mm) if x_mm + PLACES_MM[gauge] < BORDER_MM => texture(mm)(gauge, x_mm, t_s),
+                _ => CODES * GAINS[gauge] * rough((x_mm + PLACES_MM[gauge] - BORDER_MM).max(0.0)),
+            };
+            let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+            bench.noise_lsb = 4.0;
+            let begins_mm = if ridges_mm.is_some() { 0.0 } else { BORDER_MM };
+            bench.x_mm = begins_mm;
+            let way_mm = BORDER_MM + 3.5 - begins_mm;
+            bench.rub((way_mm / 0.05) as u64, |_| 50.0, felt);
+            let beyond = bench.rub(1_200, |_| 50.0, felt);
+            let share = beyond.iter().filter(|estimate| estimate.valid).count() as f64;
+            valid[of] += share / beyond.len() as f64 / seeds.clone().count() as f64;
+        }
+    }
+    let [without, behind] = valid;
+    assert!(
+        behind < 0.05 && without < 0.05,
+        "{behind} behind ridges, {without} without"
+    );
+}

@@ -76,6 +76,10 @@ fn row(family: &Family, summaries: &[Summary]) -> Record {
     let of = |number: fn(&Summary) -> Option<f64>| summaries.iter().filter_map(number);
     let most = |number| of(number).reduce(f64::max);
     let least = |number| of(number).reduce(f64::min);
+    let mean = |number| {
+        let numbers: Vec<f64> = of(number).collect();
+        (!numbers.is_empty()).then(|| numbers.iter().sum::<f64>() / numbers.len() as f64)
+    };
     let percent = |share: Option<f64>| number(share.map(|share| 100.0 * share), 2);
     Record::default()
         .with("scenes", family.title)
@@ -84,11 +88,12 @@ fn row(family: &Family, summaries: &[Summary]) -> Record {
             "worst rms, %:",
             number(most(|summary| summary.rms_percent), 2),
         )
-        .with("goal:", number(family.goal_percent(), 1))
+        .with("goal:", number(family.goal_percent(), 2))
         .with(
             "least valid share:",
             number(least(|summary| summary.valid_share), 3),
         )
+        .with("its mean:", number(mean(|summary| summary.valid_share), 3))
         .with(
             "valid yet > 10 % off, worst, %:",
             percent(most(|summary| summary.wrong_share)),
