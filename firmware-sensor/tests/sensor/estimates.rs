@@ -528,6 +528,39 @@ fn rough(seed: u64) -> impl Fn(f64) -> f64 {
     move |x_mm| heights[((x_mm / STEP_MM) as usize).min(heights.len() - 1)]
 }
 
+/// Share of valid estimates, over surfaces of [`rough`], of a bench that rubs so; it is at x = 0 mm first.
+fn valid_on_rough(velocity_mm_s: impl Fn(f64) -> f64 + Copy) -> f64 {
+    const SEEDS: u64 = 24;
+    let valid = (1..=SEEDS).map(|seed| {
+        let rough = rough(seed);
+        let felt = |gauge: usize, x_mm: f64, _: f64| {
+            CODES * GAINS[gauge] * rough(x_mm + PLACES_MM[gauge] + 3.0)
+        };
+        let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+        bench.noise_lsb = 4.0;
+        let settled = |t_s: f64| velocity_mm_s(t_s + 1.0);
+        let _ = bench.rub(1_000, velocity_mm_s, felt);
+        let estimates = bench.rub(4_000, settled, felt);
+        estimates.iter().filter(|estimate| estimate.valid).count() as f64 / estimates.len() as f64
+    });
+    valid.sum::<f64>() / SEEDS as f64
+}
+
+/// Whoever rubs one place to and fro meets the same heights again, which then look periodic: a known weakness, that is not to
+/// grow.
+#[test]
+fn one_place_of_a_rough_surface_is_taken_for_a_wave_no_more_often_than_is_said() {
+    let along = valid_on_rough(|_| 14.0);
+    let to_and_fro = [6.0, 12.0, 20.0]
+        .map(|length_mm| valid_on_rough(move |t_s| 60.0 * (120.0 / length_mm * t_s).sin()));
+    println!("valid along 70 mm: {along:.3}; to and fro over 6, 12, 20 mm: {to_and_fro:.3?}");
+    assert!(along < 0.05, "{along}");
+    assert!(
+        to_and_fro.iter().all(|share| *share < 0.3),
+        "{to_and_fro:?}"
+    );
+}
+
 /// What follows clear ridges is more often a surface than not, but it need not be a periodic one.
 #[test]
 fn behind_clear_ridges_a_rough_surface_is_no_wave() {

@@ -63,7 +63,7 @@ pub struct Encoder {
 /// | duration | | 4–10 s |
 /// | rest in front | | 0.3–0.6 s |
 /// | constant speed | 0.3 | 10–80 mm/s, up to speed in 0.1–0.3 s |
-/// | sinusoid | 0.35 | 0.3–2 Hz, 10–60 mm; one in four of them 1–4 Hz, 3–10 mm, log-uniform |
+/// | sinusoid | 0.35 | 0.3–2 Hz, 10–60 mm |
 /// | reaches | 0.35 | 20–80 mm in 0.4–1.6 s each, pauses of 0–0.5 s |
 /// | scatter of turns and times | always, in strokes | σ 0–5 % |
 /// | tremor of speed | 0.5 | 0–15 % at 8–12 Hz |
@@ -229,19 +229,6 @@ impl Hand {
                 dice.chance(0.15).then_some(slider)
             },
             encoder: Encoder::draw(dice),
-        }
-    }
-
-    /// Has one sinusoid in four be of short strokes, over a surface whose longest wave is `wavelength_mm`: whoever rubs one place
-    /// to and fro meets the same ground again and again. By dice of its own, so that all else is as it was drawn.
-    pub fn shorten(&mut self, dice: &mut Dice, wavelength_mm: f64) {
-        let is_short = dice.chance(0.25);
-        let (short_mm, short_hz) = (dice.log_between(3.0, 10.0), dice.log_between(1.0, 4.0));
-        if let Stroke::Sinusoid { hz, length_mm } = &mut self.stroke
-            && is_short
-        {
-            *length_mm = short_mm.max(WAVES_PER_STROKE * wavelength_mm);
-            *hz = short_hz.min(FASTEST_MM_S / (PI * *length_mm));
         }
     }
 

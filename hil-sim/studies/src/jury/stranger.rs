@@ -68,7 +68,6 @@ const STREAM_OF_GAUGES: u64 = 4;
 const STREAM_OF_FORM: u64 = 5;
 const STREAM_OF_FORCE: u64 = 6;
 const STREAM_OF_FORCE_NOISE: u64 = 7;
-const STREAM_OF_SHORT: u64 = 8;
 
 /// What kind of surface a trial has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -206,8 +205,7 @@ impl Trial {
             contact_mm,
         };
         ground.bend = bend(&ground, dice);
-        let mut hand = Hand::draw(dice, ground.longest_mm());
-        hand.shorten(&mut Dice::new(seed, STREAM_OF_SHORT), ground.longest_mm());
+        let hand = Hand::draw(dice, ground.longest_mm());
         let mut pickup = Pickup::draw(dice);
         if class == Class::HumOnly {
             pickup.hum = dice.between(0.3, 2.0);
