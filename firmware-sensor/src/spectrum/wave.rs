@@ -1,7 +1,7 @@
 //! The wave of the moment, where it is not the line: a new surface, or chance.
 
 use super::evidence::{WaveEvidence, best_of};
-use super::{CONVINCING, SAME, Spectrum, Supposition, is_common, is_in_most, off};
+use super::{CONVINCING, SAME, Spectrum, Supposition, fills_some, is_common, off};
 use crate::float::larger;
 
 /// The wave of the moment, from one estimate to the next.
@@ -35,10 +35,10 @@ impl Spectrum {
         if !is_common {
             return None;
         }
-        // Where a strong line has gone, something has taken its place. If that is no wave, it fills a wave and a half in few gauges.
+        // Where a strong line has gone, something has taken its place. What is no wave may fill a gauge for a wave and a half, and seldom two.
         let follows = self.line.is_gone()
             && self.wave.held_waves > 0.0
-            && is_in_most(&best, self.touch.usable);
+            && fills_some(&best, self.touch.usable);
         let least = if follows { best.share() } else { 0.0 };
         Some(Supposition {
             wavelength_mm: best.wavelength_mm,

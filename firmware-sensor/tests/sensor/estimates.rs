@@ -586,6 +586,7 @@ fn behind_clear_ridges_a_rough_surface_is_no_wave() {
         }
     }
     let [without, behind] = valid;
+    println!("valid {behind:.3} behind ridges, {without:.3} without");
     assert!(
         behind < 0.05 && without < 0.05,
         "{behind} behind ridges, {without} without"
