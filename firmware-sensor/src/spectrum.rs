@@ -365,7 +365,7 @@ fn fills_some(fitted: &Fitted, usable: u8) -> bool {
         .filter(|&gauge| usable >> gauge & 1 == 1)
         .filter(|&gauge| fitted.explaineds[gauge] > FILLS * fitted.totals[gauge])
         .count();
-    filled >= 2
+    filled >= 2.min(usable.count_ones() as usize)
 }
 
 /// Relative distance.

@@ -35,7 +35,8 @@ impl Spectrum {
         if !is_common {
             return None;
         }
-        // Where a strong line has gone, something has taken its place. What is no wave may fill a gauge for a wave and a half, and seldom two.
+        // Where a strong line has gone, something has taken its place. What is no wave may fill a gauge for a wave and a half, and
+        // seldom two.
         let follows = self.line.is_gone()
             && self.wave.held_waves > 0.0
             && fills_some(&best, self.touch.usable);
