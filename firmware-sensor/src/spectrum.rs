@@ -82,11 +82,9 @@ const LATEST_WAVES: f32 = 1.0 / 3.0;
 const LATEST_POWER: f32 = 0.05;
 /// Share over two waves from which on a wave is strong: its fit needs no average to lean on.
 const STRONG: f32 = 0.8;
-/// Estimates in a row that must find a wave that is not known yet before it is stood by, a weak one and a strong one: chance
-/// makes such a wave, and seldom twice the same.
+/// Estimates in a row that must find a weak wave that is not known yet before it is stood by: chance makes such a wave, and
+/// seldom twice the same.
 const TIMES: u8 = 5;
-/// See [`TIMES`].
-const TIMES_STRONG: u8 = 2;
 /// Share of a gauge's energy from which on a wave fills it: there is hardly anything else.
 const FILLS: f32 = 0.9;
 /// A supposition that moves by more than this share is another one.
@@ -306,12 +304,8 @@ impl Spectrum {
         }
         self.sure_times = (self.sure_times + u8::from(is_sure)).min(TIMES);
         self.sure_mm = said.wavelength_mm;
-        let times = if fitted.share() > STRONG {
-            TIMES_STRONG
-        } else {
-            TIMES
-        };
-        let valid = is_sure && (said.new || !is_new || self.sure_times >= times);
+        let at_once = said.new || fitted.share() > STRONG || !is_new;
+        let valid = is_sure && (at_once || self.sure_times == TIMES);
         Finding {
             wavelength_mm: Some(said.wavelength_mm).filter(|mm| mm.is_finite() && *mm > 0.0),
             valid,
