@@ -213,8 +213,8 @@ mod tests {
             let family = families.iter().find(|family| family.folder == folder);
             family.and_then(Family::goal_percent)
         };
-        assert_eq!(goal("table-1-20-db"), Some(0.5));
-        assert_eq!(goal("table-1-0-db"), Some(1.5));
+        assert_eq!(goal("table-1-20-db"), Some(0.05));
+        assert_eq!(goal("table-1-0-db"), Some(0.3));
         assert_eq!(goal("boundary"), None);
     }
 
