@@ -3,9 +3,9 @@
 
 mod recorded;
 
-use std::fs::{self, File};
+use std::fs::{self, DirBuilder, File};
 use std::io::{BufRead, BufReader, Write};
-use std::os::unix::fs::symlink;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, symlink};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
@@ -14,7 +14,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use protocol::{DisplayState, Hello, Hold, Message, Role, Stop, StopReason};
-use rustix::fs::{CWD, FileType, Mode, mknodat};
+use rustix::fs::{CWD, FileType, Mode, major, minor, mknodat};
 use rustix::process::{Pid, WaitOptions, waitpid};
 use tests::bridge;
 use tests::fake_bench::{FakeBench, Running};
@@ -244,28 +244,37 @@ fn a_second_monitor_sees_the_same_and_goes_on_when_the_first_one_ends() {
     }
 }
 
+/// One that is not merely halted, as under a debugger: it has the port's lock, and shares nothing.
 #[test]
-fn a_program_that_has_a_port_and_stands_still_is_named_with_what_to_do() {
+fn a_program_that_has_a_port_and_does_not_answer_is_named_with_what_to_do() {
     let board = FakeBoard::new(Role::Sensor);
     let absent = name_of_a_port("stands-still");
-    let owner = Lines::of(monitor_at(board.path(), &absent).arg("--plain"));
-    owner.with("sensor known: ");
-    owner.signal("STOP");
+    let run = name_of_a_port("stands-still-run");
+    let folder = run.join("ridgelink");
+    let mut ours = DirBuilder::new();
+    ours.recursive(true).mode(0o700);
+    ours.create(&folder).expect("a folder can be made");
+    let number = fs::metadata(board.path()).expect("a terminal").rdev();
+    let lock = format!("port-{}-{}.lock", major(number), minor(number));
+    let mut owner = File::create(folder.join(lock)).expect("a file can be made");
+    owner.lock().expect("nobody else has it");
+    let words = "host-bridge monitor (process 1)";
+    owner.write_all(words.as_bytes()).expect("there is room");
     // Sooner than it is known who has it.
     let mut command = bridge::command();
+    command.env("XDG_RUNTIME_DIR", &run);
     command.args(["stop", "--within", "1", "--sensor"]);
     let stop = bridge::Running::start(command.arg(board.path())).wait(LIMIT);
     assert_eq!(stop.status.code(), Some(1), "{}", stop.stderr);
-    let words = "NOT STOPPED as far as is known: sensor: its port is not open yet";
-    assert!(stop.stderr.contains(words), "{}", stop.stderr);
-    let guest = Lines::of(monitor_at(board.path(), &absent).arg("--plain"));
+    let what = "NOT STOPPED as far as is known: sensor: its port is not open yet";
+    assert!(stop.stderr.contains(what), "{}", stop.stderr);
+    let mut monitor = monitor_at(board.path(), &absent);
+    monitor.env("XDG_RUNTIME_DIR", &run);
+    let guest = Lines::of(monitor.arg("--plain"));
     let line = guest.with("sensor busy: ");
-    let words = format!(
-        "host-bridge monitor (process {}) has it and does not answer: let that process go on",
-        owner.child.id()
-    );
-    assert!(line.contains(&words), "{line}");
-    owner.signal("CONT");
+    let what = format!("{words} has it and does not answer: let that process go on");
+    assert!(line.contains(&what), "{line}");
+    drop(owner);
     guest.with("sensor known: ");
 }
 
