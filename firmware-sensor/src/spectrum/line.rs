@@ -267,7 +267,7 @@ impl Spectrum {
 }
 
 impl Line {
-    /// A strong line is not there any more.
+    /// There is no line, or a strong one is not there any more.
     pub(super) fn is_gone(&self) -> bool {
         self.there < 0.5
     }

@@ -157,7 +157,9 @@ impl Spectrum {
         survey.line_pass.begin(start_mm, 1..lengths, usable, base);
         // The short kernel sees a new surface first. What takes a line's place goes on as long as it has a peak.
         let highest = highest_peak(&short);
-        let goes_on = (self.line.is_gone())
+        let goes_on = self
+            .line
+            .is_gone()
             .then_some(highest)
             .flatten()
             .and_then(|highest| peak_at(&short, self.wave.mm, highest))

@@ -160,6 +160,8 @@ mod tests {
         assert_eq!(moved.at(0.0, 0.0), None);
         moved.at(1e-3, 2.0);
         assert!((moved.at(1.0, 2.0).expect("it is driven") - 2.0).abs() < 1e-9);
+        // As a sine of the same power has it.
+        assert!((moved.amplitude_v() / 8.0_f64.sqrt() - 1.0).abs() < 0.01);
         assert!(Displacement::of(&DEFAULT_ACTUATORS[0]).is_none());
     }
 }
