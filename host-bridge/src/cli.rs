@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use crate::bench::{Bench, BenchError, Seat};
 use crate::link::{Event, Link};
+use crate::monitor::firmware_log::{LogError, Logs, Origin};
 use crate::place::Place;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -147,6 +148,21 @@ fn links(
 /// The link to the board of `role`, if the bench has a seat for it.
 fn link(bench: &Bench, role: Role, tell: impl FnMut(Event) + Send + 'static) -> Option<Link> {
     Some(Link::open(role, bench.seat(role)?.place(), tell))
+}
+
+/// Reads the logs of these boards: of those at another site, and of those whose ELF and whose bytes the bench names.
+fn follow_logs(bench: &Bench, roles: &[Role], logs: &Logs) -> Result<(), LogError> {
+    for &role in roles {
+        let Some(seat) = bench.seat(role) else {
+            continue;
+        };
+        if let (Some(elf), Some(rtt)) = (&seat.elf, &seat.rtt) {
+            logs.follow(role, elf, Origin::of(rtt))?;
+        } else if let Place::Port(port) = seat.place() {
+            logs.follow_far(role, &port);
+        }
+    }
+    Ok(())
 }
 
 /// A place in a recording, in s after its start.

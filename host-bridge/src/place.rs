@@ -19,6 +19,11 @@ pub fn is_far(port: &Path) -> bool {
     port.to_str().is_some_and(|name| name.starts_with(FAR))
 }
 
+/// What the log of a board at another site is called.
+pub fn log_of(far: &Path) -> String {
+    format!("{}.log", far.display())
+}
+
 /// Where a board's console is looked for, each time that it is to be opened.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Place {

@@ -79,21 +79,13 @@ impl ConfigureBoards {
         } else {
             wanted.retain(|(role, _)| bench.roles().contains(role));
         }
-        let mut is_whole = true;
-        for role in [Role::Sensor, Role::Display] {
-            if let Some(Place::Port(port)) = bench.seat(role).map(Seat::place)
+        for (role, change) in &wanted {
+            if let Some(Place::Port(port)) = bench.seat(*role).map(Seat::place)
                 && is_far(&port)
-                && let Some(index) = wanted.iter().position(|(of, _)| *of == role)
+                && !change.is_empty()
             {
                 let (port, name) = (port.display(), role.name());
-                let words =
-                    format!("{name}: {port} is at another site: run `host-bridge configure` there");
-                if wanted.len() == 1 || !wanted[index].1.is_empty() {
-                    bail!(words);
-                }
-                say(&words);
-                wanted.remove(index);
-                is_whole = false;
+                bail!("{name}: {port} is at another site: run `host-bridge configure` there");
             }
         }
         let (events, told) = unbounded();
@@ -150,7 +142,7 @@ impl ConfigureBoards {
             }
         }
         let is_done = |board: &Board| board.answer.as_ref().is_some_and(|answer| answer.is_done);
-        let is_whole = is_whole && boards.iter().all(is_done);
+        let is_whole = boards.iter().all(is_done);
         Ok(ExitCode::from(u8::from(!is_whole)))
     }
 

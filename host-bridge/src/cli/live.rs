@@ -4,6 +4,7 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::process::ExitCode;
 
 use crate::live::{PORT, Settings, Viewer};
+use crate::monitor::firmware_log::Logs;
 use anyhow::bail;
 use crossbeam_channel::unbounded;
 
@@ -18,7 +19,8 @@ a recording; and on a page for any browser, with a Stop for both boards. Foxglov
 The page is on the port beside Foxglove's, for the server of Foxglove's own library answers nothing else.
 
 Both are for this computer alone; --listen lets others in, who may then watch and stop. There is neither password \
-nor encryption, so that it asks for --insecure. The sensor board is asked for its gauges meanwhile.";
+nor encryption, so that it asks for --insecure. The sensor board is asked for its gauges meanwhile. A board's log is \
+shown if the bench file names its firmware (`elf`) and the log's source (`rtt`).";
 
 /// How it is used.
 pub const EXAMPLES: &str = "\
@@ -60,6 +62,8 @@ impl Live {
         }
         let orders = Orders::to_stop()?;
         let bench = self.boards.find()?;
+        let (logs, lines) = Logs::new();
+        super::follow_logs(&bench, &bench.roles(), &logs)?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let teller = Teller::start(bench.roles());
         let (events, told) = unbounded();
@@ -75,7 +79,7 @@ impl Live {
             port: self.port,
             gauges: !self.no_gauges,
         };
-        let viewer = Viewer::start(settings, links, told)?;
+        let viewer = Viewer::start(settings, links, told, lines)?;
         if self.port.is_none() && viewer.foxglove_port() != PORT {
             eprintln!(
                 "host-bridge: another program has port {PORT} or {}: this one is shown on others",

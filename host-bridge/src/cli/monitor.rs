@@ -158,7 +158,11 @@ impl Monitor {
                     "the {role}'s log can't be read without its firmware: give --{role}-elf",
                     role = role.name()
                 ),
-                (_, None) => {}
+                (_, None) => {
+                    if let Place::Port(port) = seat.place() {
+                        logs.follow_far(role, &port);
+                    }
+                }
             }
         }
         Ok(())

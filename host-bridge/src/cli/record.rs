@@ -102,7 +102,7 @@ impl Record {
         let roles = bench.roles();
         let (logs, lines) = Logs::new();
         // Before there is a file: an old one is not to go for a log that can't be read.
-        follow(&bench, &roles, &logs)?;
+        super::follow_logs(&bench, &roles, &logs)?;
         let (events, told) = channel();
         let recorder = Arc::new(Recorder::default());
         let recording = Arc::clone(&recorder);
@@ -209,18 +209,6 @@ impl Record {
             unheard(progress),
         ))
     }
-}
-
-/// Reads the logs of the boards whose ELF and whose bytes the bench names.
-fn follow(bench: &Bench, roles: &[Role], logs: &Logs) -> Result<(), LogError> {
-    for &role in roles {
-        if let Some(seat) = bench.seat(role)
-            && let (Some(elf), Some(rtt)) = (&seat.elf, &seat.rtt)
-        {
-            logs.follow(role, elf, Origin::of(rtt))?;
-        }
-    }
-    Ok(())
 }
 
 /// Whether an event changes what is to be said, to a board or of it.
@@ -385,9 +373,11 @@ impl Session<'_> {
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
         }
         for (role, what) in self.lines.try_iter() {
-            match what {
-                LogEvent::Log { level, text } => self.recorder.on_log(role, level, text),
-                other => self.screen.tell(&format!("{}: {other}", role.name())),
+            if let Some((level, text)) = what.line() {
+                self.recorder.on_log(role, level, text);
+            }
+            if !matches!(what, LogEvent::Log { .. }) {
+                self.screen.tell(&format!("{}: {what}", role.name()));
             }
         }
         if let Some(words) = self.outcome.overdue() {

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use crate::hand::Hand;
 use crate::link::OPERATOR_STOP;
+use crate::monitor::firmware_log::Logs;
 use crate::relay::credentials::Credentials;
 use crate::relay::endpoint::{Endpoint, Reach};
 use crate::relay::name::{Name, common_name, common_name_of_router};
@@ -57,7 +58,8 @@ NAME.router, or NAME.operator for `relay stop`, where NAME is what --name says. 
 computer wants --insecure.
 
 Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards until the display says \
-that it has stopped. SIGUSR2 to a bridge that holds the bench hands it over to one of its site that waits. Once a second a bridge \
+that it has stopped. SIGUSR2 to a bridge that holds the bench hands it over to one of its site that waits. Who \
+watches the board from the other site has its log, if the bench file names its firmware (`elf`) and the log's source (`rtt`). Once a second a bridge \
 says on standard error how it goes; --json says it on standard output, and leaves nothing out.";
 
 /// What `relay` is asked for.
@@ -225,6 +227,10 @@ impl Bridge {
             shows_far_board: true,
             system: System::default(),
         })?;
+        let (logs, lines) = Logs::new();
+        super::follow_logs(&bench, &[role], &logs)?;
+        let tell_log = bridge.log_teller();
+        thread::spawn(move || lines.iter().for_each(|(_, line)| tell_log(line)));
         let stop = bridge.stopper();
         stops.obey(move || stop(OPERATOR_STOP));
         hand_overs.obey(bridge.hander_over());

@@ -94,7 +94,16 @@ impl FoxgloveServer {
 
     /// Says what a link told at `at_us` of this host's clock.
     pub fn on_event(&mut self, role: Role, event: &Event, at_us: u64) {
-        for entry in self.rows.enter(role, at_us, &Note::Event(event.clone())) {
+        self.say(role, at_us, &Note::Event(event.clone()));
+    }
+
+    /// Says a line of the log of the board of `role`, read at `at_us` of this host's clock.
+    pub fn on_log(&mut self, role: Role, level: Option<&'static str>, text: String, at_us: u64) {
+        self.say(role, at_us, &Note::Log(level, text));
+    }
+
+    fn say(&mut self, role: Role, at_us: u64, note: &Note) {
+        for entry in self.rows.enter(role, at_us, note) {
             self.cdr.clear();
             // A row that can't be said is none of this program's.
             if let Ok(Some(at)) = self.encoder.encode(&entry, &mut self.cdr) {

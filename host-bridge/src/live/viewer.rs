@@ -1,7 +1,7 @@
 //! Both servers, fed by the links to the boards, and what the page shows.
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -15,6 +15,7 @@ use crate::clock::now_us;
 use crate::hand;
 use crate::link::{Event, Link, stop_all};
 use crate::monitor::dashboard::{Dashboard, FRESH_US};
+use crate::monitor::log_entry::LogEvent;
 use crate::recording::gauge_stream::GaugeStream;
 
 /// Between two pictures for the page.
@@ -46,14 +47,17 @@ pub struct Viewer {
     stream: GaugeStream,
     links: Vec<(Role, Link)>,
     told: Receiver<(Role, Event)>,
+    lines: mpsc::Receiver<(Role, LogEvent)>,
 }
 
 impl Viewer {
-    /// Begins to listen. What the links tell comes from `told`. Fails if a port can't be had.
+    /// Begins to listen. What the links tell comes from `told`, what the boards log from `lines`. Fails if a port can't
+    /// be had.
     pub fn start(
         settings: Settings,
         links: Vec<(Role, Link)>,
         told: Receiver<(Role, Event)>,
+        lines: mpsc::Receiver<(Role, LogEvent)>,
     ) -> Result<Self, LiveError> {
         let (foxglove, (listener, page)) = take_ports(settings.address, settings.port)?;
         let newest = Arc::<Newest>::default();
@@ -70,6 +74,7 @@ impl Viewer {
             stream: GaugeStream::new(settings.gauges),
             links,
             told,
+            lines,
         })
     }
 
@@ -101,6 +106,7 @@ impl Viewer {
             }
             if Instant::now() >= due {
                 due = Instant::now() + PICTURE;
+                self.take_lines();
                 if Instant::now() >= hands_due {
                     hands_due = Instant::now() + HANDS;
                     hands = hand::hands();
@@ -117,6 +123,15 @@ impl Viewer {
         // Shown already, with the last ones.
         self.dashboard.take_log_entries();
         self.newest.put(picture(&self.dashboard, hands).to_string());
+    }
+
+    fn take_lines(&mut self) {
+        while let Ok((role, what)) = self.lines.try_recv() {
+            if let Some((level, text)) = what.line() {
+                self.foxglove.on_log(role, level, text, now_us());
+            }
+            self.dashboard.log(role, what);
+        }
     }
 
     fn take(&mut self, role: Role, event: Event) {
@@ -257,12 +272,22 @@ mod tests {
             gauges: false,
         };
         let (_events, told) = crossbeam_channel::unbounded();
-        let mut viewer = Viewer::start(settings, Vec::new(), told).expect("any port will do");
+        let (logs, lines) = mpsc::channel();
+        let viewer = Viewer::start(settings, Vec::new(), told, lines);
+        let mut viewer = viewer.expect("any port will do");
         let port = PathBuf::from("/dev/null/sensor");
         viewer.take(Role::Sensor, Event::StateChanged(State::Silent(port)));
+        let line = LogEvent::Log {
+            level: Some("info"),
+            text: "scan 1 of 4".to_owned(),
+        };
+        logs.send((Role::Display, line)).expect("it is there");
+        viewer.take_lines();
         viewer.show(&[]);
         assert_eq!(viewer.dashboard.take_log_entries(), []);
-        assert_eq!(viewer.dashboard.log_entries.len(), 1);
+        assert_eq!(viewer.dashboard.log_entries.len(), 2);
+        let log = picture(&viewer.dashboard, &[])["log"].take();
+        assert_eq!(log[0], json!("display: info: scan 1 of 4"));
     }
 
     #[test]

@@ -20,8 +20,9 @@ use probe_rs::rtt::{Rtt, ScanRegion, find_rtt_control_block_in_raw_file};
 use probe_rs::{Permissions, Session};
 use protocol::Role;
 
-use super::log_entry::LogEvent;
+use super::log_entry::{LogEvent, LogLine};
 use crate::link::is_pause;
+use crate::place::{is_far, log_of};
 use crate::shared_port::{SharedPorts, open_source};
 use crate::state::State;
 use crate::system::{Input, Opened, Ports};
@@ -108,6 +109,45 @@ impl Logs {
         thread::spawn(move || log.read(&origin));
         Ok(())
     }
+
+    /// Reads the log of the board of `role` for as long as this lives, if `port` is that of a board at another site: the
+    /// relay there decodes it. That no relay shows it is told by its link.
+    pub fn follow_far(&self, role: Role, port: &Path) {
+        if !is_far(port) {
+            return;
+        }
+        let name = PathBuf::from(log_of(port));
+        let (lines, ended) = (self.lines.clone(), Arc::clone(&self.ended));
+        thread::spawn(move || {
+            while !ended.load(Ordering::Acquire) {
+                if let Ok(opened) = SharedPorts.open(&name) {
+                    listen_far(opened.input, &ended, |line| {
+                        let _ = lines.send((role, line.into()));
+                    });
+                }
+                thread::park_timeout(AGAIN);
+            }
+        });
+    }
+}
+
+/// Hears the lines that a relay tells, until it has gone or this is `ended`.
+fn listen_far(mut input: Box<dyn Input>, ended: &AtomicBool, mut tell: impl FnMut(LogLine)) {
+    let (mut bytes, mut begun) = (vec![0; READ_BYTES], Vec::new());
+    while !ended.load(Ordering::Acquire) {
+        match input.read(&mut bytes) {
+            Ok(count) => begun.extend_from_slice(&bytes[..count]),
+            Err(error) if is_pause(&error) => {}
+            Err(_) => break,
+        }
+        while let Some(end) = begun.iter().position(|&byte| byte == b'\n') {
+            let line: Vec<u8> = begun.drain(..=end).collect();
+            if let Ok(line) = serde_json::from_slice(&line) {
+                tell(line);
+            }
+        }
+    }
+    input.close(true);
 }
 
 impl Drop for Logs {

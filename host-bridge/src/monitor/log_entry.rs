@@ -3,8 +3,12 @@
 use std::fmt;
 
 use protocol::{ArmState, DisplayState, Role, Trip};
+use serde::{Deserialize, Serialize};
 
 use crate::state::{Advised, State};
+
+/// How grave a line can be, in defmt's words.
+const LEVELS: [&str; 5] = ["trace", "debug", "info", "warn", "error"];
 
 /// Something that happened at one of the boards.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +43,52 @@ pub enum LogEvent {
     LogLost(String),
 }
 
+/// What comes of a log, as it is told to other programs and to the other site.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LogLine {
+    /// See [`LogEvent::Log`].
+    Line {
+        /// How grave it is, in defmt's words.
+        level: Option<String>,
+        /// The line.
+        text: String,
+    },
+    /// See [`LogEvent::LogLost`].
+    Lost(String),
+}
+
+impl LogLine {
+    /// The line of `event`, or as much of it as `longest` bytes hold; none if the event is not a log's.
+    pub fn of(event: LogEvent, longest: usize) -> Option<Self> {
+        let cut = |mut text: String| {
+            text.truncate(text.floor_char_boundary(longest));
+            text
+        };
+        match event {
+            LogEvent::Log { level, text } => Some(Self::Line {
+                level: level.map(ToOwned::to_owned),
+                text: cut(text),
+            }),
+            LogEvent::LogLost(reason) => Some(Self::Lost(cut(reason))),
+            _ => None,
+        }
+    }
+}
+
+/// It comes from elsewhere: what no text has is taken out of it.
+impl From<LogLine> for LogEvent {
+    fn from(line: LogLine) -> Self {
+        let plain = |text: String| text.replace(char::is_control, " ");
+        match line {
+            LogLine::Line { level, text } => Self::Log {
+                level: LEVELS.into_iter().find(|known| level.as_deref() == Some(known)),
+                text: plain(text),
+            },
+            LogLine::Lost(reason) => Self::LogLost(plain(reason)),
+        }
+    }
+}
+
 impl LogEvent {
     /// One word for its kind; never changes.
     pub const fn word(&self) -> &'static str {
@@ -49,6 +99,15 @@ impl LogEvent {
             Self::Restarted => "restarted",
             Self::Log { .. } => "log",
             Self::LogLost { .. } => "log-lost",
+        }
+    }
+
+    /// What a recording keeps as the board's log: its lines, with defmt's level, and where some are missing.
+    pub fn line(&self) -> Option<(Option<&'static str>, String)> {
+        match self {
+            Self::Log { level, text } => Some((*level, text.clone())),
+            Self::LogLost(_) => Some((Some("warn"), self.to_string())),
+            _ => None,
         }
     }
 

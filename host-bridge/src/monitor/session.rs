@@ -88,8 +88,8 @@ impl RecordingFeed {
 
     fn on_log(&self, role: Role, what: &LogEvent) {
         let recorder = locked(&self.0).recorder.clone();
-        if let (Some(recorder), LogEvent::Log { level, text }) = (recorder, what) {
-            recorder.on_log(role, *level, text.clone());
+        if let (Some(recorder), Some((level, text))) = (recorder, what.line()) {
+            recorder.on_log(role, level, text);
         }
     }
 

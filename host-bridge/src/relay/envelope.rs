@@ -20,10 +20,11 @@ use protocol::stop::{STOP_LENGTH, Stopped};
 use protocol::{Estimate, HELLO_LENGTH, Hello, Message, Ping, Pong, Role, Stop, Trip};
 use serde::{Deserialize, Serialize};
 
+use crate::monitor::log_entry::LogLine;
 use crate::relay::gate::SequenceNumber;
 
 /// The version of everything in this file but for what never changes.
-pub const ENVELOPE_VERSION: u8 = 5;
+pub const ENVELOPE_VERSION: u8 = 6;
 /// What stands in its place in an envelope that never changes.
 const FROZEN: u8 = 0;
 /// The word of a Stop that the board has not obeyed yet; whether it was told follows.
@@ -33,8 +34,14 @@ const NO_CAUSE: u8 = u8::MAX;
 
 /// Bytes in front of the content.
 const HEADER: usize = HELLO_LENGTH + 1 + 3 * size_of::<u64>();
-/// Longest content: a message, its kind and its board's start.
-const MAX_CONTENT: usize = 1 + 5 + MAX_PAYLOAD;
+/// Longest text of a line of a log, in bytes.
+pub const MAX_LINE: usize = 400;
+/// Longest content: a line of a log with its kind, number and level; or a message, its kind and its board's start.
+const MAX_CONTENT: usize = if MAX_LINE + 18 > 1 + 5 + MAX_PAYLOAD {
+    MAX_LINE + 18
+} else {
+    1 + 5 + MAX_PAYLOAD
+};
 /// Longest envelope, in bytes.
 pub const MAX_ENVELOPE: usize = HEADER + MAX_CONTENT;
 
@@ -94,6 +101,15 @@ pub enum Content {
     Shown(Message),
     /// Who holds the bench hands it over to who waits for it.
     HandOver,
+    /// What somebody who watches the other site's board asks it: see [`is_question`].
+    Question(Message),
+    /// A line of the board's log, for who watches.
+    Log {
+        /// Counts the lines that were sent, so that whoever misses some knows.
+        number: u32,
+        /// The line.
+        line: LogLine,
+    },
 }
 
 /// One thing said by one bridge to the other.
@@ -198,6 +214,7 @@ impl Envelope {
         match (self.role(), &self.content) {
             (None, _) => false,
             (Some(role), Content::Board { message, .. }) => is_carried(role, message),
+            (Some(_), Content::Question(message)) => is_question(message),
             (Some(_), _) => true,
         }
     }
@@ -254,6 +271,14 @@ pub fn is_carried(role: Role, message: &Message) -> bool {
     }
 }
 
+/// Whether `message` may be said to a board by whoever watches it from the other site: it asks, and changes nothing.
+pub const fn is_question(message: &Message) -> bool {
+    matches!(
+        message,
+        Message::Question(_) | Message::StreamGauges(_) | Message::Ping(_)
+    )
+}
+
 /// What its board says of the place of a message that is carried: a texture comes after the estimate that it was made with.
 pub const fn sequence_number(start: u32, message: &Message) -> Option<SequenceNumber> {
     let sequence = match message {
@@ -279,7 +304,7 @@ fn is_finite(estimate: &Estimate) -> bool {
 mod tests {
     use super::*;
     use crate::link::host_hello;
-    use protocol::{Contact, GaugeHealth, Motion, Range, StopReason};
+    use protocol::{Contact, GaugeHealth, Motion, Question, Range, StopReason};
 
     fn estimate() -> Estimate {
         Estimate {
@@ -364,6 +389,27 @@ mod tests {
             of(Role::Sensor, Content::Greeting(host_hello())),
             of(Role::Sensor, Content::Shown(Message::Estimate(estimate()))),
             of(Role::Display, Content::HandOver),
+            of(
+                Role::Display,
+                Content::Question(Message::Question(Question::Configuration)),
+            ),
+            of(
+                Role::Sensor,
+                Content::Log {
+                    number: u32::MAX,
+                    line: LogLine::Line {
+                        level: Some("error".to_owned()),
+                        text: "x".repeat(MAX_LINE),
+                    },
+                },
+            ),
+            of(
+                Role::Sensor,
+                Content::Log {
+                    number: u32::MAX,
+                    line: LogLine::Lost("x".repeat(MAX_LINE)),
+                },
+            ),
         ]
     }
 
@@ -371,7 +417,7 @@ mod tests {
     fn envelopes_are_read_as_they_were_written() {
         for envelope in contents() {
             let bytes = envelope.to_bytes();
-            assert!(bytes.len() < MAX_ENVELOPE);
+            assert!(bytes.len() <= MAX_ENVELOPE);
             assert_eq!(Envelope::from_bytes(&bytes), Ok(envelope));
         }
     }

@@ -1,14 +1,16 @@
-//! The board at the other site, for programs at this one: they find it as `relay:NAME.ROLE`, hear all that it says,
-//! and may stop it. Nothing is carried for it while nobody listens.
+//! The board at the other site, for programs at this one: they find it as `relay:NAME.ROLE`, hear all that it says and
+//! logs, may ask it what changes nothing, and stop it. Nothing is carried for it while nobody listens.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-use protocol::{Hello, MAX_FRAME, Message, Role, Stop, frame};
+use protocol::{Hello, MAX_FRAME, Message, Role, frame};
 
 use crate::clock::Clock;
 use crate::lock::locked;
-use crate::place::FAR;
+use crate::monitor::log_entry::LogLine;
+use crate::place::{FAR, log_of};
 use crate::relay::name::Name;
 use crate::shared_port::Outlet;
 
@@ -20,6 +22,9 @@ const BEAT_US: u64 = 100_000;
 /// The board at the other site.
 pub struct FarBoard {
     outlet: Outlet,
+    log: Outlet,
+    /// The line that comes next.
+    next_line: Mutex<Option<u32>>,
     asked: Arc<Asked>,
     hello: Mutex<Option<Hello>>,
     sequence: AtomicU16,
@@ -36,32 +41,35 @@ struct Asked {
 }
 
 impl FarBoard {
-    /// Shows the board of `role` of the bench called `name`. `on_stop` is called when a program says Stop to it.
-    /// `None` if another relay shows it already.
+    /// Shows the board of `role` of the bench called `name`. `on_said` is called with what programs say to it, but for
+    /// their Hellos. `None` if another relay shows it already.
     pub fn open(
         name: &Name,
         role: Role,
         clock: Arc<dyn Clock>,
-        on_stop: impl Fn(Stop) + Send + Sync + 'static,
+        on_said: impl Fn(Message) + Send + Sync + 'static,
     ) -> Option<Self> {
         let asked = Arc::<Asked>::default();
         let (theirs, time) = (Arc::clone(&asked), Arc::clone(&clock));
-        let outlet = Outlet::open(&port(name, role), move |frames| {
+        let port = port(name, role);
+        let outlet = Outlet::open(&port, move |frames| {
             theirs.at_us.store(time.now_us().max(1), Ordering::Release);
             for given in frames.split(|&byte| byte == 0) {
                 let mut content = given.to_vec();
                 let Ok((_, payload)) = frame::decode(&mut content) else {
                     continue;
                 };
-                match frame::frozen(payload) {
+                match frame::message(payload) {
                     Some(Message::Hello(_)) => theirs.wants_hello.store(true, Ordering::Release),
-                    Some(Message::Stop(stop)) => on_stop(stop),
-                    _ => {}
+                    Some(message) => on_said(message),
+                    None => {}
                 }
             }
         })?;
         Some(Self {
             outlet,
+            log: Outlet::open(&log_of(Path::new(&port)), |_| {})?,
+            next_line: Mutex::new(None),
             asked,
             hello: Mutex::new(None),
             sequence: AtomicU16::new(0),
@@ -90,6 +98,24 @@ impl FarBoard {
         }
     }
 
+    /// Tells a line of its log, that with this `number` of those that were sent.
+    pub fn log(&self, number: u32, line: &LogLine) {
+        let next = locked(&self.next_line).replace(number.wrapping_add(1));
+        // One that counts backwards has started anew.
+        let lost = next.map_or(0, |next| number.wrapping_sub(next).cast_signed());
+        if lost > 0 {
+            self.tell(&LogLine::Lost(format!("{lost} lines were lost on the way")));
+        }
+        self.tell(line);
+    }
+
+    fn tell(&self, line: &LogLine) {
+        // A text and a number are always written.
+        let mut text = serde_json::to_string(line).unwrap_or_default();
+        text.push('\n');
+        self.log.say(text.as_bytes());
+    }
+
     /// Says what is due; to be called every 25 ms or so.
     pub fn elapse(&self) {
         let hello = *locked(&self.hello);
@@ -102,6 +128,7 @@ impl FarBoard {
         // Another thread may say something in between.
         if self.clock.now_us().saturating_sub(said_us) >= BEAT_US {
             self.put(&[]);
+            self.log.say(&[]);
         }
     }
 

@@ -8,6 +8,7 @@ use protocol::{Hello, Message, Ping, Pong, Role, Stop, Trip};
 
 use crate::clock::{Notify, micros};
 use crate::lock::locked;
+use crate::monitor::log_entry::LogLine;
 use crate::relay::age::{Age, Ages};
 use crate::relay::envelope::{Content, Envelope, EnvelopeError, sequence_number};
 use crate::relay::flow::Answer;
@@ -51,6 +52,10 @@ pub enum Heard {
     Greeting(Hello),
     /// What the board there said, for who watches here.
     Shown(Message),
+    /// What the log of the board there said, and which line of those that were sent that is.
+    Log(u32, LogLine),
+    /// Who watches there asks the board here.
+    Question(Message),
 }
 
 /// The inward direction of a bridge.
@@ -145,6 +150,8 @@ impl Inward {
             Content::Watch => Heard::Watched,
             Content::Greeting(hello) if is_holder => Heard::Greeting(hello),
             Content::Shown(message) if is_holder => Heard::Shown(message),
+            Content::Log { number, line } if is_holder => Heard::Log(number, line),
+            Content::Question(message) => Heard::Question(message),
             Content::Leaving => {
                 self.gate.leave(envelope.session);
                 Heard::Nothing
@@ -161,7 +168,8 @@ impl Inward {
             | Content::Stopped { .. }
             | Content::Stopping { .. }
             | Content::Greeting(_)
-            | Content::Shown(_) => Heard::Nothing,
+            | Content::Shown(_)
+            | Content::Log { .. } => Heard::Nothing,
         }
     }
 

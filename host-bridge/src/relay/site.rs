@@ -11,7 +11,7 @@
 mod keeper;
 
 use std::hash::{BuildHasher, RandomState};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
@@ -22,8 +22,9 @@ use protocol::{Hello, Message, Ping, Pong, Role, Stop, StopReason};
 use crate::clock::{Notify, micros};
 use crate::link::{self, Event, Link, LinkSender, NotSent};
 use crate::lock::locked;
+use crate::monitor::log_entry::{LogEvent, LogLine};
 use crate::place::Place;
-use crate::relay::envelope::{Content, Envelope, is_carried};
+use crate::relay::envelope::{Content, Envelope, MAX_LINE, is_carried, is_question};
 use crate::relay::far_board::{self, FarBoard};
 use crate::relay::hand::Hand;
 use crate::relay::inward::{Due, Outbox};
@@ -41,6 +42,9 @@ use keeper::Keeper;
 
 /// Between two tries to connect for the first time.
 const CONNECT_AGAIN: Duration = Duration::from_millis(250);
+/// Most questions of the other site that the board is told within [`QUESTIONS_US`]: a fiftieth of its line.
+const QUESTIONS: u32 = 64;
+const QUESTIONS_US: u64 = 1_000_000;
 /// Longest wait of the writer for something to write.
 const IDLE: Duration = Duration::from_secs(1);
 
@@ -87,6 +91,10 @@ struct Shared {
     /// Until when the other site watches the board here, in µs.
     shown_until_us: AtomicU64,
     far_board: OnceLock<FarBoard>,
+    /// Since when questions are counted, in µs, and how many have come.
+    questions: Mutex<(u64, u32)>,
+    /// How many lines of the log were sent.
+    lines: AtomicU32,
     stops: Mutex<Stops>,
     hand: Mutex<Hand>,
     rival: Mutex<Bystander>,
@@ -145,6 +153,8 @@ impl Site {
             is_other_board: AtomicBool::new(false),
             shown_until_us: AtomicU64::new(0),
             far_board: OnceLock::new(),
+            questions: Mutex::default(),
+            lines: AtomicU32::new(0),
             stops: Mutex::new(Stops::default()),
             hand: Mutex::new(Hand::default()),
             rival: Mutex::default(),
@@ -220,6 +230,13 @@ impl Site {
     /// Hands the bench over to the bridge of this site that waits for it. What comes of it is told.
     pub fn hand_over(&self) {
         self.shared.hand_over();
+    }
+
+    /// A way to tell what the log of the board here says to who watches it from the other site, that can be handed to
+    /// other threads.
+    pub fn log_teller(&self) -> impl Fn(LogEvent) + Send + Sync + 'static {
+        let shared = Arc::clone(&self.shared);
+        move |event| shared.on_log(event)
     }
 
     /// How the bridge stands. Ages are of the time since this was last asked, or of all of it.
@@ -354,7 +371,7 @@ impl Shared {
                 self.say(Channel::Stop, Content::Stop { id, stop });
             }
         }
-        if self.now_us() < self.shown_until_us.load(Ordering::Acquire) {
+        if self.is_shown() && self.has_room_for(&message) {
             self.say(Channel::Shown, Content::Shown(message.clone()));
         }
         if !is_carried(self.settings.role, &message) {
@@ -366,6 +383,56 @@ impl Shared {
             && !wire.publish(Channel::Board, &envelope)
         {
             locked(&self.outward).counts.failed += 1;
+        }
+    }
+
+    /// Whether the other site watches the board here.
+    fn is_shown(&self) -> bool {
+        self.now_us() < self.shown_until_us.load(Ordering::Acquire)
+    }
+
+    /// Gauges are ten times as much as all the rest: a network that is slow already is spared them.
+    fn has_room_for(&self, message: &Message) -> bool {
+        !matches!(message, Message::Gauges(_))
+            || locked(&self.outward).flow.is_answered(self.now_us())
+    }
+
+    /// The log of the board here says something.
+    fn on_log(&self, event: LogEvent) {
+        if self.is_shown()
+            && let Some(line) = LogLine::of(event, MAX_LINE)
+        {
+            let number = self.lines.fetch_add(1, Ordering::Relaxed);
+            self.say(Channel::Shown, Content::Log { number, line });
+        }
+    }
+
+    /// Who watches at the other site asks the board here.
+    fn on_question(&self, at_us: u64, message: &Message) {
+        let mut questions = locked(&self.questions);
+        if at_us.saturating_sub(questions.0) >= QUESTIONS_US {
+            *questions = (at_us, 0);
+        }
+        questions.1 = questions.1.saturating_add(1);
+        let is_too_many = questions.1 > QUESTIONS;
+        drop(questions);
+        let Some(board) = self.board.get().filter(|_| !is_too_many) else {
+            return;
+        };
+        let Message::Ping(Ping { sent_us }) = *message else {
+            // Asked again if it is not answered.
+            let _ = board.post(message);
+            return;
+        };
+        // By this bridge, who knows the board's clock: each program's pings have numbers of its own.
+        let offset_us = board.clocks().map(|clocks| clocks.offset_us);
+        if let Some(board_us) = offset_us.and_then(|offset_us| at_us.checked_add_signed(offset_us)) {
+            let pong = Pong {
+                sent_us,
+                received_us: board_us,
+                answered_us: board_us,
+            };
+            self.say(Channel::Shown, Content::Shown(Message::Pong(pong)));
         }
     }
 
@@ -424,6 +491,12 @@ impl Shared {
                     .get()
                     .inspect(|far_board| far_board.say(&message));
             }
+            Heard::Log(number, line) => {
+                self.far_board
+                    .get()
+                    .inspect(|far_board| far_board.log(number, &line));
+            }
+            Heard::Question(message) => self.on_question(at_us, &message),
             Heard::Stopped(id, trip) => {
                 if locked(&self.stops).on_outcome(id) {
                     self.tell(Notice::StopHeard(self.other_role, trip));
@@ -499,14 +572,16 @@ impl Shared {
     fn show_far_board(self: &Arc<Self>) {
         // It is in there.
         let shared = Arc::downgrade(self);
-        let on_stop = move |stop| {
-            if let Some(shared) = shared.upgrade() {
-                shared.stop(stop);
+        let on_said = move |message| match (shared.upgrade(), message) {
+            (Some(shared), Message::Stop(stop)) => shared.stop(stop),
+            (Some(shared), question) if is_question(&question) => {
+                shared.say(Channel::Clock, Content::Question(question));
             }
+            _ => {}
         };
         let clock = Arc::clone(&self.settings.system.clock);
         if let Some(far_board) =
-            FarBoard::open(&self.settings.name, self.other_role, clock, on_stop)
+            FarBoard::open(&self.settings.name, self.other_role, clock, on_said)
         {
             let _ = self.far_board.set(far_board);
         }

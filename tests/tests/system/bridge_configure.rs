@@ -204,10 +204,11 @@ fn what_is_no_setting_and_no_description_is_refused_before_a_board_is_asked() {
     assert_eq!(far.status.code(), Some(2), "{}", far.stderr);
     let why = "sensor: relay:bench.sensor is at another site: run `host-bridge configure` there";
     assert!(far.stderr.contains(why), "{}", far.stderr);
-    // What is here is looked at all the same.
+    // It may be looked at, where there is a relay.
     let words = ["--within", "1"];
-    let half = configure(&[Path::new("relay:bench.sensor"), nowhere[1]], &words);
+    let half = configure(&[Path::new("relay:no-bench.sensor"), nowhere[1]], &words);
     assert_eq!(half.status.code(), Some(1), "{}", half.stderr);
+    let why = "sensor: relay:no-bench.sensor: not there (";
     assert!(half.stderr.contains(why), "{}", half.stderr);
     let why = format!("display: {}: not there (", nowhere[1].display());
     assert!(half.stderr.contains(&why), "{}", half.stderr);

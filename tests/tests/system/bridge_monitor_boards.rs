@@ -7,10 +7,14 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use hil_sim_boards::bench::{Command as Order, PortName};
+use host_bridge::recording::reader::Reader;
+use host_bridge::recording::row::Row;
 use protocol::Role;
+use serde_json::Value;
 use tests::bench::{BAUD, ExclusiveBench, bench, folder, until};
 use tests::bridge;
 use tests::elves;
+use tests::relay::{Relay, free_port};
 use tests::terminal::Terminal;
 
 /// Only what hangs takes so long.
@@ -72,6 +76,58 @@ fn lines_tell_of_the_surface_the_cable_and_the_boards_logs() {
     with(&["# ", "sensor log: info: "]);
     child.kill().expect("it runs");
     child.wait().expect("it has run");
+}
+
+#[test]
+fn the_other_site_reads_a_boards_log_and_configuration_and_has_its_gauges() {
+    let alone = steady("monitor-far");
+    let at = format!("tcp/127.0.0.1:{}", free_port());
+    let bench = alone.bench.bench_file().display().to_string();
+    let name = format!("far-{}", std::process::id());
+    let relay = |role: &str, end: &str| {
+        Relay::start([role, end, &at, "--name", &name, "--bench", &bench])
+    };
+    let _relays = [relay("sensor", "--listen"), relay("display", "--connect")];
+    let far = format!("relay:{name}.sensor");
+    let recording = folder("monitor-far").join("far.mcap");
+    fs::create_dir_all(folder("monitor-far")).expect("a folder can be made");
+    let mut recorder = bridge::command()
+        .args(["record", "--sensor", &far])
+        .arg(&recording)
+        .spawn()
+        .expect("the program can be started");
+    let mut child = bridge::command()
+        .args(["monitor", "--plain", "--sensor", &far])
+        .spawn()
+        .expect("the program can be started");
+    let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+    next_with(&mut lines, &["sensor known: "]);
+    let asked = bridge::command()
+        .args(["configure", "--json", "--sensor", &far])
+        .output()
+        .expect("the program can be started");
+    let words = String::from_utf8_lossy(&asked.stderr);
+    assert_eq!(asked.status.code(), Some(0), "{words}");
+    let shown: Value = serde_json::from_slice(&asked.stdout).expect("it is JSON");
+    assert!(shown["sensor"].is_object(), "{shown}");
+    let order = alone.bench.command(Order::Reset(Role::Sensor));
+    order.expect("it can be done");
+    next_with(&mut lines, &["sensor log: info: ", " started"]);
+    child.kill().expect("it runs");
+    child.wait().expect("it has run");
+    // What another program records there, with the samples that it asks for.
+    let rows = || {
+        let mut reader = Reader::open(&recording).ok()?;
+        let (mut has_line, mut has_samples) = (false, false);
+        while let Ok(Some(entry)) = reader.next_entry() {
+            has_line |= matches!(entry.row, Row::Log(_));
+            has_samples |= matches!(entry.row, Row::Gauges(_));
+        }
+        (has_line && has_samples).then_some(())
+    };
+    until("a line and samples", rows);
+    recorder.kill().expect("it runs");
+    recorder.wait().expect("it has run");
 }
 
 /// What the sensor board logs at its start, as bytes of its RTT channel.

@@ -8,7 +8,10 @@ use std::time::{Duration, Instant};
 
 use host_bridge::link::{Event, Link};
 use host_bridge::place::Place;
-use protocol::{Message, Question, Role, Stop, StopReason};
+use protocol::{
+    Configuration, Configure, Message, Question, Role, SensorConfiguration, Stop, StopReason,
+    StreamGauges,
+};
 use rustix::process::Signal;
 use serde_json::Value;
 use tests::certificates::{Authority, Kind};
@@ -357,24 +360,37 @@ fn a_program_at_one_site_hears_all_that_the_other_sites_board_says_and_may_stop_
         let is_block = |event| matches!(event, Event::Heard { message, .. } if message == block);
         told.try_iter().any(is_block)
     }));
-    // It is for looking at: nothing else reaches the board.
+    // It may be asked, and not changed.
+    assert!(wait_until(LIMIT, || link.clocks().is_some()));
     sensor.take_heard();
-    link.post(&Message::Question(Question::Configuration))
-        .expect("it is said");
+    let change = Message::Configure(Configure {
+        number: 1,
+        base: 0,
+        configuration: Configuration::Sensor(SensorConfiguration::DEFAULT),
+    });
+    let questions = [
+        Message::Question(Question::Configuration),
+        Message::Question(Question::Capabilities),
+        Message::StreamGauges(StreamGauges { for_ms: 10 }),
+    ];
+    for message in [&[change], &questions[..]].concat() {
+        link.post(&message).expect("it is said");
+    }
+    let mut heard = Vec::new();
+    assert!(wait_until(LIMIT, || {
+        heard.extend(sensor.take_heard());
+        questions.iter().all(|question| heard.contains(question))
+    }));
     link.stop(Stop {
         reason: StopReason::Operator,
     })
     .expect("it is said");
-    let mut heard = Vec::new();
     assert!(wait_until(LIMIT, || {
         heard.extend(sensor.take_heard());
         heard.iter().any(is_stop)
     }));
-    assert!(
-        !heard
-            .iter()
-            .any(|message| matches!(message, Message::Question(_)))
-    );
+    let is_change = |message: &Message| matches!(message, Message::Configure(_));
+    assert!(!heard.iter().any(is_change));
     listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
     assert!(wait_until(LIMIT, || !link.is_stopping()));
 }
