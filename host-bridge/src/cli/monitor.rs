@@ -8,6 +8,7 @@ use crate::bench::{Bench, Seat};
 use crate::monitor::firmware_log::{Logs, Origin};
 use crate::monitor::line::Format;
 use crate::monitor::{self, Options, RecordingFeed, Source};
+use crate::place::Place;
 use anyhow::Context;
 use clap::ValueHint;
 use crossbeam_channel::unbounded;

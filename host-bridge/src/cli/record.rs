@@ -9,11 +9,10 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::bench::Bench;
 use crate::clock::now_us;
 use crate::link::{Event, Link};
 use crate::lock::locked;
-use crate::monitor::firmware_log::{LogError, Logs, Origin};
+use crate::monitor::firmware_log::Logs;
 use crate::monitor::log_entry::LogEvent;
 use crate::recording::gauge_stream::GaugeStream;
 use crate::recording::{PART, Progress, Recorder, Settings};

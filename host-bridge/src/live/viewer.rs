@@ -1,8 +1,8 @@
 //! Both servers, fed by the links to the boards, and what the page shows.
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
-use std::sync::{Arc, mpsc};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError};

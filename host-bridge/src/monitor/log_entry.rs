@@ -81,7 +81,9 @@ impl From<LogLine> for LogEvent {
         let plain = |text: String| text.replace(char::is_control, " ");
         match line {
             LogLine::Line { level, text } => Self::Log {
-                level: LEVELS.into_iter().find(|known| level.as_deref() == Some(known)),
+                level: LEVELS
+                    .into_iter()
+                    .find(|known| level.as_deref() == Some(known)),
                 text: plain(text),
             },
             LogLine::Lost(reason) => Self::LogLost(plain(reason)),

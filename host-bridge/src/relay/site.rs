@@ -426,7 +426,8 @@ impl Shared {
         };
         // By this bridge, who knows the board's clock: each program's pings have numbers of its own.
         let offset_us = board.clocks().map(|clocks| clocks.offset_us);
-        if let Some(board_us) = offset_us.and_then(|offset_us| at_us.checked_add_signed(offset_us)) {
+        if let Some(board_us) = offset_us.and_then(|offset_us| at_us.checked_add_signed(offset_us))
+        {
             let pong = Pong {
                 sent_us,
                 received_us: board_us,

@@ -84,9 +84,8 @@ fn the_other_site_reads_a_boards_log_and_configuration_and_has_its_gauges() {
     let at = format!("tcp/127.0.0.1:{}", free_port());
     let bench = alone.bench.bench_file().display().to_string();
     let name = format!("far-{}", std::process::id());
-    let relay = |role: &str, end: &str| {
-        Relay::start([role, end, &at, "--name", &name, "--bench", &bench])
-    };
+    let relay =
+        |role: &str, end: &str| Relay::start([role, end, &at, "--name", &name, "--bench", &bench]);
     let _relays = [relay("sensor", "--listen"), relay("display", "--connect")];
     let far = format!("relay:{name}.sensor");
     let recording = folder("monitor-far").join("far.mcap");
