@@ -55,7 +55,7 @@ const MISFIT_ESTIMATES: u8 = 30;
 const MISFIT_MM: f32 = 10.0;
 /// Estimates without a fault before a gauge is taken back.
 const SOUND_ESTIMATES: u8 = 50;
-/// The same where all were off: what was felt before is forgotten then, and need not fade.
+/// The same where all were off: a blow, or a supply that failed, is over for all of them.
 const SOUND_TOGETHER_ESTIMATES: u8 = 10;
 
 /// The gauges' case histories.

@@ -180,7 +180,7 @@ impl Hum {
     }
 
     /// What may be hum or texture and is not told apart yet; nothing from 0.2 s of rest on, or, if there
-    /// is none, from the time on that what is steady has been decided on.
+    /// is none, from 0.15 s after what is steady has been decided on.
     pub fn pickup(&self) -> Pickup {
         self.pickup
     }

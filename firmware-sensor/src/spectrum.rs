@@ -10,12 +10,12 @@
 //! a real surface the wave explains a quarter of what the gauges say, and chance explains nearly as much:
 //! what tells them apart is whether a line stays where it is over fresh ground. So each estimate has two
 //! suppositions. The *line* is the clearest peak of the averaged spectrum, the one that stands highest above
-//! its flanks; the *wave* is the clearest peak of the moment, where that is elsewhere: a new surface. Either is
+//! its flanks; the *wave* is a peak of the moment, where that is elsewhere: a new surface. Either is
 //! refined by least squares over the last waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
 //!
 //! λ̂ is the period: that of the clearest peak is taken for its half or third, if lines stand there that the peak's
 //! wavelength does not explain and that period does, its own among them, and a fit finds it there. Of waves that have no
-//! common period the strongest is λ̂.
+//! common period the clearest is λ̂.
 //!
 //! The work of an estimate is spread over the ten milliseconds before it: see [`Spectrum::push`].
 

@@ -21,9 +21,9 @@ pub struct LineEvidence {
     /// Share of the energy that the wave explains over the latest two, three and eight waves, or as many of these as are
     /// configured: so for all that is said of eight. Over two it is 0 where that fit found another wave.
     pub shares: [f32; 3],
-    /// How far the fits over three and eight waves are from the line, RMS over the average's memory.
+    /// How far the fits over three and eight waves are from the line, RMS over the line's memory of eight waves.
     pub wander: [f32; 2],
-    /// Share of the average's memory in which the moment's highest peak was the line.
+    /// Share of that memory in which the moment's clearest peak was the line.
     pub agreement: f32,
     /// Relative distance of λ̂ from the line.
     pub distance: f32,
@@ -31,7 +31,7 @@ pub struct LineEvidence {
     pub presence: f32,
     /// The line's height over its flanks, a third of an octave away.
     pub sharpness: f32,
-    /// How far the line itself has wandered, RMS of ln λ over twice the average's memory.
+    /// How far the line itself has wandered, RMS of ln λ over twice that memory.
     pub spread: f32,
     /// Shares over three and eight waves, averaged as the wander is.
     pub kept_shares: [f32; 2],

@@ -145,8 +145,8 @@ impl Spectrum {
             kept_shares: self.line.shares,
         };
         self.weighed.line = Some((wavelength_mm, evidence));
-        let inherited = if self.line.young_waves > 0.0 && share_over(1) > STRONG {
-            share_over(1)
+        let inherited = if self.line.young_waves > 0.0 && share > STRONG {
+            share
         } else {
             0.0
         };
