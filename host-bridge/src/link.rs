@@ -173,7 +173,11 @@ impl Link {
 
     /// The board's clock; none before the first exchange since it started.
     pub fn clocks(&self) -> Option<Clocks> {
-        self.shared.clocks()
+        let clock = locked(&self.shared.clock);
+        Some(Clocks {
+            offset_us: clock.offset_us()?,
+            round_trip_us: clock.round_trip_us()?,
+        })
     }
 }
 
@@ -202,11 +206,6 @@ impl LinkSender {
     /// What this end of the line has counted. See [`Link::counters`].
     pub fn counters(&self) -> PortCounters {
         self.shared.counters()
-    }
-
-    /// The board's clock. See [`Link::clocks`].
-    pub fn clocks(&self) -> Option<Clocks> {
-        self.shared.clocks()
     }
 
     /// Stops whatever board is there: says so now, and again until it answers that it has stopped; a board that
@@ -247,14 +246,6 @@ impl Shared {
             Some(line) => line.counters(),
             None => *locked(&self.counters),
         }
-    }
-
-    fn clocks(&self) -> Option<Clocks> {
-        let clock = locked(&self.clock);
-        Some(Clocks {
-            offset_us: clock.offset_us()?,
-            round_trip_us: clock.round_trip_us()?,
-        })
     }
 
     fn stop(&self, stop: Stop) -> Result<(), NotSent> {

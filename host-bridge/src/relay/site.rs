@@ -10,6 +10,7 @@
 
 mod keeper;
 
+use std::collections::VecDeque;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -45,6 +46,8 @@ const CONNECT_AGAIN: Duration = Duration::from_millis(250);
 /// Most questions of the other site that the board is told within [`QUESTIONS_US`]: a fiftieth of its line.
 const QUESTIONS: u32 = 64;
 const QUESTIONS_US: u64 = 1_000_000;
+/// Pings of the other site's programs that may be under way.
+const PINGS: usize = 16;
 /// Longest wait of the writer for something to write.
 const IDLE: Duration = Duration::from_secs(1);
 
@@ -93,6 +96,9 @@ struct Shared {
     far_board: OnceLock<FarBoard>,
     /// Since when questions are counted, in µs, and how many have come.
     questions: Mutex<(u64, u32)>,
+    /// The last pings of the other site's programs, the newest first: when they were passed on, in µs, and their own
+    /// numbers.
+    pings: Mutex<VecDeque<(u64, u64)>>,
     /// How many lines of the log were sent.
     lines: AtomicU32,
     stops: Mutex<Stops>,
@@ -154,6 +160,7 @@ impl Site {
             shown_until_us: AtomicU64::new(0),
             far_board: OnceLock::new(),
             questions: Mutex::default(),
+            pings: Mutex::default(),
             lines: AtomicU32::new(0),
             stops: Mutex::new(Stops::default()),
             hand: Mutex::new(Hand::default()),
@@ -371,8 +378,10 @@ impl Shared {
                 self.say(Channel::Stop, Content::Stop { id, stop });
             }
         }
-        if self.is_shown() && self.has_room_for(&message) {
-            self.say(Channel::Shown, Content::Shown(message.clone()));
+        if self.is_shown()
+            && let Some(message) = self.shown(&message)
+        {
+            self.say(Channel::Shown, Content::Shown(message));
         }
         if !is_carried(self.settings.role, &message) {
             return;
@@ -391,10 +400,22 @@ impl Shared {
         self.now_us() < self.shown_until_us.load(Ordering::Acquire)
     }
 
-    /// Gauges are ten times as much as all the rest: a network that is slow already is spared them.
-    fn has_room_for(&self, message: &Message) -> bool {
-        !matches!(message, Message::Gauges(_))
-            || locked(&self.outward).flow.is_answered(self.now_us())
+    /// What of `message` is for who watches from the other site.
+    fn shown(&self, message: &Message) -> Option<Message> {
+        match message {
+            // Ten times as much as all the rest: a network that is slow already is spared them.
+            Message::Gauges(_) if !locked(&self.outward).flow.is_answered(self.now_us()) => None,
+            // With the number that it was asked by; others are for programs here.
+            Message::Pong(pong) => {
+                let pings = locked(&self.pings);
+                let asked = pings.iter().find(|(own_us, _)| *own_us == pong.sent_us)?;
+                Some(Message::Pong(Pong {
+                    sent_us: asked.1,
+                    ..*pong
+                }))
+            }
+            message => Some(message.clone()),
+        }
     }
 
     /// The log of the board here says something.
@@ -419,22 +440,18 @@ impl Shared {
         let Some(board) = self.board.get().filter(|_| !is_too_many) else {
             return;
         };
-        let Message::Ping(Ping { sent_us }) = *message else {
-            // Asked again if it is not answered.
-            let _ = board.post(message);
-            return;
+        let message = match *message {
+            // Under a number of this bridge's own, for another program's may be the same.
+            Message::Ping(Ping { sent_us }) => {
+                let mut pings = locked(&self.pings);
+                pings.truncate(PINGS - 1);
+                pings.push_front((at_us, sent_us));
+                Message::Ping(Ping { sent_us: at_us })
+            }
+            ref question => question.clone(),
         };
-        // By this bridge, who knows the board's clock: each program's pings have numbers of its own.
-        let offset_us = board.clocks().map(|clocks| clocks.offset_us);
-        if let Some(board_us) = offset_us.and_then(|offset_us| at_us.checked_add_signed(offset_us))
-        {
-            let pong = Pong {
-                sent_us,
-                received_us: board_us,
-                answered_us: board_us,
-            };
-            self.say(Channel::Shown, Content::Shown(Message::Pong(pong)));
-        }
+        // Asked again if it is not answered.
+        let _ = board.post(&message);
     }
 
     /// Bytes came from the other site.

@@ -364,8 +364,7 @@ fn a_program_at_one_site_hears_all_that_the_other_sites_board_says_and_may_stop_
     assert!(wait_until(LIMIT, || link.clocks().is_some()));
     sensor.take_heard();
     let change = Message::Configure(Configure {
-        number: 1,
-        base: 0,
+        replaces: None,
         configuration: Configuration::Sensor(SensorConfiguration::DEFAULT),
     });
     let questions = [
